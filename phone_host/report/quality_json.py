@@ -39,7 +39,7 @@ def quality_json(report: QualityReport) -> dict[str, Any]:
 def _pair(report: QualityReport, pair: MeasuredPair | FailedPair) -> dict[str, Any]:
     both = {"name": pair.name, "left": pair.left, "right": pair.right}
     if isinstance(pair, FailedPair):
-        return {**both, "problem": pair.problem, "remedy": pair.remedy}
+        return {**both, "problem": pair.failure.message, "remedy": pair.failure.remedy}
     quality, problem, tiles = pair.quality, flaw(pair.quality), pair.quality.tiles
     return {
         **both,

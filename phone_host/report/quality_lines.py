@@ -80,7 +80,7 @@ def quality_row(pair: MeasuredPair) -> tuple[str, ...]:
 
 def _remarks(pair: MeasuredPair | FailedPair) -> list[str]:
     if isinstance(pair, FailedPair):
-        return [f"{pair.name} failed: {pair.problem}: {pair.remedy}"]
+        return [f"{pair.name} failed: {pair.failure.text}"]
     problem = flaw(pair.quality)
     found = [*([problem] if problem else []), *pair.remarks]
     return [f"{'note' if remark.is_note else 'warning'}: {pair.name}: {remark.text}" for remark in found]

@@ -109,7 +109,7 @@ def _all_pairs(report: QualityReport) -> str:
     rows: list[tuple[str, ...]] = []
     for pair in report.pairs:
         if isinstance(pair, FailedPair):
-            rows.append((pair.name, f"failed: {pair.problem}: {pair.remedy}"))
+            rows.append((pair.name, f"failed: {pair.failure.text}"))
         else:
             theory = f"{report.theory_m(pair.quality.distance_m) * 1e3:.2f} mm" if pair.is_plane else "\u2013"
             rows.append((*quality_row(pair), theory))

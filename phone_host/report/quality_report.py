@@ -166,7 +166,7 @@ def quality_verdict(report: QualityReport) -> tuple[Headline, str]:
     if not planes:
         first = report.pairs[0]
         if isinstance(first, FailedPair):
-            return Headline.BAD, f"No pair was measured. The first: {first.problem}"
+            return Headline.BAD, f"No pair was measured. The first: {first.failure.message}"
         problem = flaw(first.quality)
         assert problem is not None
         said = problem.message

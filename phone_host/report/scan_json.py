@@ -73,7 +73,7 @@ def _mat(report: ScanReport) -> dict[str, Any] | None:
 
 def _pair(pair: ScannedPair | FailedPair) -> dict[str, Any]:
     if isinstance(pair, FailedPair):
-        return {"name": pair.name, "problem": pair.problem, "remedy": pair.remedy}
+        return {"name": pair.name, "problem": pair.failure.message, "remedy": pair.failure.remedy}
     return {
         "name": pair.name,
         "stamp_s": pair.stamp_s,

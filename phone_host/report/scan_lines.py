@@ -36,7 +36,7 @@ def scan_lines(report: ScanReport, out: str) -> list[str]:
         lines.append(
             f"note: {counted(len(told) - _MOST_LINES, 'further stretch', 'further stretches')}: see report.json"
         )
-    lines += [f"warning: {pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed[:_MOST_LINES]]
+    lines += [f"warning: {pair.name} failed: {pair.failure.text}" for pair in report.failed[:_MOST_LINES]]
     lines += [remark.line for remark in report.remarks]
     return [*lines, f"written to {out}: {', '.join(report.files)}"]
 

@@ -55,7 +55,7 @@ def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand
     view = model_view(shown, MODEL)
     remarks = [
         *(stretch.sentence for stretch in report.stretches),
-        *(f"{pair.name} failed: {pair.problem}: {pair.remedy}" for pair in report.failed),
+        *(f"{pair.name} failed: {pair.failure.text}" for pair in report.failed),
         *(remark.text for remark in report.remarks),
     ]
     files = (

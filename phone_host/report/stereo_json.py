@@ -73,7 +73,7 @@ def _entry(pair: PairReport | FailedPair) -> dict[str, Any]:
     """Make the object of one of several pairs; its folder's report.json has the rest."""
     both = {"name": pair.name, "left": pair.left, "right": pair.right}
     if isinstance(pair, FailedPair):
-        return {**both, "problem": pair.problem, "remedy": pair.remedy}
+        return {**both, "problem": pair.failure.message, "remedy": pair.failure.remedy}
     return {
         **both,
         "verdict": pair_verdict(pair)[0].value,

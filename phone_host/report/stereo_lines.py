@@ -70,7 +70,7 @@ def set_lines(report: SetReport, out: str) -> list[str]:
 
 def _pair_line(pair: PairReport | FailedPair, name: str) -> str:
     if isinstance(pair, FailedPair):
-        return f"{name}  failed: {pair.problem}: {pair.remedy}"
+        return f"{name}  failed: {pair.failure.text}"
     points = "matched" if pair.written.points is None else f"have depth, {counted(pair.written.points, 'point')}"
     return f"{name}  {pair_verdict(pair)[0].value}, {pair.share:.0%} {points}"
 

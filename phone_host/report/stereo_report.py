@@ -6,10 +6,10 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Final
 
 from common.diagnostic import Diagnostic
-from common.errors import DataError, TandemError
+from common.errors import DataError
 from common.words import counted
 from phone_host.diagnostics.codes import Code
 from phone_host.model import CutCounts, DepthLimits, Drift, MatchReport, Search, StereoGeometry
@@ -106,20 +106,13 @@ class FailedPair:
         name: its folder would have been called so.
         left: the left image file.
         right: the right image file.
-        problem: what is wrong.
-        remedy: what to do about it.
+        failure: why.
     """
 
     name: str
     left: str
     right: str
-    problem: str
-    remedy: str
-
-    @classmethod
-    def because(cls, error: TandemError, name: str, left: str, right: str) -> Self:
-        """Make it of what went wrong."""
-        return cls(name=name, left=left, right=right, problem=error.problem, remedy=error.remedy)
+    failure: Diagnostic
 
     def none_of(self, pairs: int) -> DataError:
         """Return the error if this is the first of so many pairs, and none could be computed."""
@@ -129,7 +122,7 @@ class FailedPair:
             else f"none of the {pairs} pairs can be computed; the first"
         )
         return DataError(
-            f"{which}: {self.problem} ({self.remedy})",
+            f"{which}: {self.failure.message} ({self.failure.remedy})",
             "mend what this names, then try again",
         )
 

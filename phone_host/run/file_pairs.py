@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final, Protocol, TypeVar
 
 from common import now
-from common.diagnostic import Diagnostic
+from common.diagnostic import Diagnostic, Severity
 from common.errors import DataError, SettingsError
 from common.imagesize.head import MOST_PIXELS
 from common.orientation import UPRIGHT, Orientation
@@ -225,7 +225,14 @@ def compute_pairs(
             except spared as error:
                 if matcher.has_no_core or len(pairs.files.pairs) == 1:
                     raise
-                done.append(FailedPair.because(error, called, str(left), str(right)))
+                done.append(
+                    FailedPair(
+                        name=called,
+                        left=str(left),
+                        right=str(right),
+                        failure=Diagnostic(error.problem, error.remedy, Severity.FAIL),
+                    )
+                )
         matcher.watcher()
     failed = [pair for pair in done if isinstance(pair, FailedPair)]
     if len(failed) == len(done):

@@ -78,7 +78,7 @@ def set_page(report: SetReport, thumbnails: Mapping[str, Picture], commands: Seq
 
 def _entry(pair: PairReport | FailedPair, both: str, picture: Picture | None) -> PairEntry:
     if isinstance(pair, FailedPair):
-        sentence = f"{pair.problem}: {pair.remedy}."
+        sentence = f"{pair.failure.text}."
         return PairEntry(
             folder="", name=both, thumbnail=None, density=float("nan"), verdict=Headline.BAD, sentence=sentence
         )

@@ -198,7 +198,7 @@ def main() -> int:
         return 3
     library = native()
     if not isinstance(library, Library):
-        print(f"error: no native library here ({library.reason}): {library.remedy}", file=sys.stderr)
+        print(f"error: no native library here ({library.message}): {library.remedy}", file=sys.stderr)
         return 3
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -38,7 +38,9 @@ MODEL = ModelFigures(
     error_scope=ErrorScope.DRIFT,
 )
 WITHOUT_DRIFT = replace(MODEL, error_scope=ErrorScope.NOISE)
-BROKEN = FailedPair(name="9", left="l/9.png", right="r/9.png", problem="l/9.png is cut off", remedy="copy it again")
+BROKEN = FailedPair(
+    name="9", left="l/9.png", right="r/9.png", failure=Diagnostic("l/9.png is cut off", "copy it again")
+)
 MESH = Mesh(
     np.array([[0, 0, 1], [0.5, 0, 1], [0, 0.25, 2]], np.float32),
     np.array([[1, 2, 3], [4, 5, 6], [7, 8, 9]], np.uint8),

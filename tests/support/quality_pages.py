@@ -52,5 +52,7 @@ def pair(name: str, found: PlaneQuality, *remarks: Diagnostic) -> MeasuredPair:
 def report(*pairs: MeasuredPair, failed: bool = False) -> QualityReport:
     """A report of these pairs, or of one wall at 1 m that was stated at 0.99 m; perhaps one more that failed."""
     given = pairs or (pair("1.png", quality(1.0, 0.99)),)
-    more = (FailedPair(name="9.png", left="left/9.png", right="right/9.png", problem="it is torn", remedy="mend it"),)
+    more = (
+        FailedPair(name="9.png", left="left/9.png", right="right/9.png", failure=Diagnostic("it is torn", "mend it")),
+    )
     return QualityReport(pairs=(*given, *(more if failed else ())), matcher="tandem")

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from common.diagnostic import Diagnostic
 from common.doctor.finding import exit_code, settings_finding, table
 from common.errors import SettingsError
 from common.ledger import StageTimes
@@ -50,7 +51,7 @@ _BARE = PairReport(
     stages_ms=(("total", 20.0),),
     trust=PairTrust(ImageFigures(), (), Answer(Grade.GOOD, "Disparity looks right.")),
 )
-_TORN = FailedPair(name="9", left="left/9.png", right="right/9.png", problem="it is torn", remedy="mend it")
+_TORN = FailedPair(name="9", left="left/9.png", right="right/9.png", failure=Diagnostic("it is torn", "mend it"))
 
 
 def test_a_pair_without_geometry_has_size_and_density_and_no_word_of_metres() -> None:

@@ -97,7 +97,7 @@ def _eventful_run() -> RunSnapshot:
 def test_every_key_of_a_report_of_stereo_is_described() -> None:
     """That of one pair, and that of several of which one failed."""
     pair = replace(test_stereo_report._PAIR, trust=test_stereo_report._BAD)
-    failed = FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")
+    failed = FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))
     keys = _keys(pair_json(pair)) | _keys(set_json(SetReport(pairs=(pair, failed), by_number=True, drift=Drift())))
     assert len(keys - {"total"}) >= 55
     assert keys <= _described("What `--json` prints", "report.json of `stereo`")

@@ -177,7 +177,8 @@ def test_pixels_outside_the_crop_do_not_lower_the_share() -> None:
         ),
         (
             SetReport(
-                pairs=(_PAIR, FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")), by_number=True
+                pairs=(_PAIR, FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))),
+                by_number=True,
             ),
             False,
         ),
@@ -215,7 +216,7 @@ def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_to
 def test_the_verdict_of_several_pairs_counts_them() -> None:
     """All good is good, all bad is bad, anything else is told in numbers."""
     bad = replace(_PAIR, trust=_BAD)
-    failed = FailedPair(name="p", left="l", right="r", problem="bad", remedy="mend")
+    failed = FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))
     assert set_verdict(SetReport(pairs=(_PAIR, _PAIR), by_number=True))[0] is Headline.GOOD
     assert set_verdict(SetReport(pairs=(bad, failed), by_number=True))[0] is Headline.BAD
     verdict, sentence = set_verdict(SetReport(pairs=(_PAIR, failed, bad), by_number=True))

@@ -112,7 +112,7 @@ def test_a_bad_pair_among_many_is_named_and_the_others_go_on(photos: Path) -> No
     report = run_stereo(_job(photos), _Watch())
     assert not report.is_sound
     assert [pair.name for pair in report.computed] == ["pair-000011"]
-    told = {pair.name: pair.problem for pair in report.failed}
+    told = {pair.name: pair.failure.message for pair in report.failed}
     assert "r002.png is 80x64 px" in told["pair-000002"]
     assert "l7.png" in told["pair-000007"]
     listed = json.loads((photos / "out" / "report.json").read_text())
