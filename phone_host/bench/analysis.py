@@ -135,13 +135,7 @@ class Analysis:
 
 
 def analyse(results: Sequence[CaseResult], fifo: FifoSettings, changes: Sequence[Change] = ()) -> Analysis:
-    """Analyse all runs together.
-
-    Args:
-        results: the measured cases.
-        fifo: the queue of all runs.
-        changes: settings that the user wants predicted, for each interface.
-    """
+    """Analyse all runs together."""
     useful = [result for result in results if result.ledgers]
     cells = [_cell(result, fifo) for result in useful]
     checked = [

@@ -114,11 +114,6 @@ def why_not_measurable(interface: Interface) -> str:
 def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
     """Ask a remote board what its camera shows; nothing else can be measured there.
 
-    Args:
-        uri: its link.
-        patience_ns: how long to wait for an absent board.
-        stop: asked several times a second.
-
     Returns:
         The case; None if `stop` ended it.
 

@@ -62,13 +62,7 @@ def remote_cases(remote: Sequence[Interface], signals: StopSignals) -> list[Case
 
 
 def measure(planned: Sequence[Case], settings: RunSettings, signals: StopSignals) -> Outcome:
-    """Run all cases until a signal comes or one fails; earlier results are kept.
-
-    Args:
-        planned: in the order in which they are run.
-        settings: for all cases.
-        signals: checked several times a second.
-    """
+    """Run all cases until a signal comes or one fails; earlier results are kept."""
     outcome = Outcome()
     run_s = _SET_UP_S + WARM_UP_S + settings.seconds
     render_s = film_images() * _RENDER_S
@@ -106,12 +100,7 @@ def measure(planned: Sequence[Case], settings: RunSettings, signals: StopSignals
 
 
 class _Bar:
-    """The progress bar over the whole matrix, in seconds of expected time; hidden if stderr is not a terminal.
-
-    Args:
-        total_s: expected time of all work.
-        signals: checked during the work.
-    """
+    """The progress bar over the whole matrix, in seconds of expected time; hidden if stderr is not a terminal."""
 
     def __init__(self, total_s: float, signals: StopSignals) -> None:
         self._progress = progress_bar(Console(stderr=True))

@@ -75,9 +75,6 @@ def figure(results: Sequence[CaseResult], under: Conditions) -> str:
     Args:
         results: what was measured; at least one with pairs.
         under: machine, date, settings.
-
-    Returns:
-        An SVG file that stands alone, for light and dark mode.
     """
     chosen = [result for result in most_compared(results) if result.ledgers]
     measured = [(str(result.case.interface), delay_series(result.ledgers)) for result in chosen]

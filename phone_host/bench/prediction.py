@@ -185,9 +185,6 @@ def foretell(target: Target, cells: Sequence[Cell]) -> Figures | Unknown:
     Args:
         target: the setting.
         cells: what was measured; cells of the target's interface are preferred.
-
-    Returns:
-        The figures, or why there are none.
     """
     images, interface = target.images, target.interface
     if not cells:

@@ -128,9 +128,6 @@ def serve(
         depth: how many may wait.
         overflow: what is dropped; `block`, whose source would not have sent, counts as drop-newest.
         wake_ns: (M,) time until an idle worker has the 1st, 2nd, ... arrival; None: no time.
-
-    Returns:
-        When each was taken and done.
     """
     start_ns, done_ns = np.full(queued_ns.size, np.nan), np.full(queued_ns.size, np.nan)
     waiting: deque[int] = deque()

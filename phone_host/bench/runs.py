@@ -116,9 +116,6 @@ def render(size: Size, qualities: Sequence[int], folder: Path, advance: Callable
         folder: receives a folder for each quality and camera.
         advance: called after each of `film_images()` images.
 
-    Returns:
-        A film for each quality.
-
     Raises:
         OSError: the folder cannot be written to.
     """
@@ -213,9 +210,6 @@ def _finished(host: Host, ends: Ends, seconds: float, stop: Callable[[], bool]) 
 
 def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...], float]:
     """Leave out the pairs of the first second.
-
-    Args:
-        ledgers: of a run, in the order in which they were done.
 
     Returns:
         The pairs done later, and the time from the last pair of the warm-up to the last of them, s: as many intervals

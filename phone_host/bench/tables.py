@@ -81,9 +81,6 @@ def rows(results: Sequence[CaseResult]) -> list[tuple[str, ...]]:
     """Make the terminal's table: stage, link, percentiles in ms; the stages of processing are indented below processing.
 
     Stages that did nothing in any of the runs are left out, and so is what is zero in all of them.
-
-    Args:
-        results: the runs to list below each other, stage by stage.
     """
     spreads = [(str(result.case.interface), statistics_of(result)) for result in results]
     table = []
@@ -105,9 +102,6 @@ def narrow_rows(result: CaseResult) -> list[tuple[str, ...]]:
 
 def result_sentence(results: Sequence[CaseResult]) -> str:
     """Say in one sentence which interface is the fastest, how long it takes from exposure to depth, what takes longest, and if a run is too short to say so.
-
-    Args:
-        results: runs over several interfaces with the same images.
 
     Returns:
         The sentence; empty if nothing was measured.

@@ -16,20 +16,12 @@ def json_text(value: Any, indent: int | None = None) -> str:  # noqa: ANN401 - w
     Args:
         value: made of dicts with text keys, lists, tuples, strings, numbers, booleans and None.
         indent: spaces per level; None for one line.
-
-    Returns:
-        The text, without a final newline.
     """
     return json.dumps(_finite(value), indent=indent, allow_nan=False)
 
 
 def json_number(value: float, digits: int = 6) -> float | None:
-    """Round a number for JSON, which has neither NaN nor infinity: they become None.
-
-    Args:
-        value: any number.
-        digits: decimals that are kept.
-    """
+    """Round a number for JSON, which has neither NaN nor infinity: they become None."""
     return round(value, digits) if math.isfinite(value) else None
 
 

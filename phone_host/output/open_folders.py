@@ -32,10 +32,6 @@ def way_to(folder: int, path: Path) -> Path:
 def sync_file(name: str, folder: int) -> None:
     """Make a file or folder in a folder survive a power cut.
 
-    Args:
-        name: its name there.
-        folder: descriptor of the folder.
-
     Raises:
         OSError: the disk fails.
     """
@@ -49,9 +45,6 @@ def sync_file(name: str, folder: int) -> None:
 def entries_of(folder: int) -> list[str]:
     """Return the names in a folder, sorted.
 
-    Args:
-        folder: its descriptor.
-
     Raises:
         OSError: as the operating system reports it.
     """
@@ -61,10 +54,6 @@ def entries_of(folder: int) -> list[str]:
 
 def remove_tree(name: str, folder: int) -> None:
     """Remove a folder with all that is in it; do nothing if it is not there. No link is followed.
-
-    Args:
-        name: its name in another one.
-        folder: descriptor of that one.
 
     Raises:
         OSError: as the operating system reports it.
@@ -81,10 +70,6 @@ def plain_name(name: str) -> str:
 
 def remove_result(name: str, folder: int) -> None:
     """Remove a file, or a folder of results; do nothing if it is gone. What others have put into that folder stays, in `NAME.foreign`.
-
-    Args:
-        name: its name.
-        folder: descriptor of the folder that holds it.
 
     Raises:
         OSError: as the operating system reports it.

@@ -42,12 +42,7 @@ def fingerprint(rig: Rig) -> str:
 
 
 def overlay_text(rig: Rig, drift: Drift) -> str:
-    """Return the content of overlay.yaml.
-
-    Args:
-        rig: as it was calibrated.
-        drift: with the correction that was in use at the end.
-    """
+    """Return the content of overlay.yaml."""
     used = drift.overlay
     values = {
         "format_version": str(OVERLAY_FORMAT),

@@ -39,11 +39,6 @@ def leave_partial(folder: int, name: str, names: re.Pattern[str]) -> bool:
 def remove_set(name: str, folder: int, names: re.Pattern[str]) -> None:
     """Remove a folder with a set of results, if it is there; what others have put into it stays, in `NAME.foreign`.
 
-    Args:
-        name: its name.
-        folder: descriptor of the folder that holds it.
-        names: pattern of the results' names.
-
     Raises:
         OSError: as the operating system reports it.
     """

@@ -26,9 +26,6 @@ def residual_jpeg(residual_px: NDArray[np.float32], roi: Crop, range_px: float, 
         roi: the region that counts.
         range_px: distance of the strongest colours, px.
         widest_px: the picture is made smaller if it is wider, px.
-
-    Returns:
-        A JPEG file.
     """
     width = residual_px.shape[1]
     share = min(1.0, widest_px / width)

@@ -67,10 +67,6 @@ def remove_results(path: Path, names: str) -> None:
 def claim(path: Path, *names: str) -> None:
     """List names in a folder as ours before they are written; they must be free or left by an earlier run.
 
-    Args:
-        path: the folder, created if missing.
-        names: names of what will be written there.
-
     Raises:
         UnavailableError: such a name belongs to a foreign file, or to a link.
         OSError: as the operating system reports it.

@@ -48,12 +48,7 @@ class RigViews:
 
 
 def write_views(storage: cv2.FileStorage, views: RigViews) -> None:
-    """Write the views.
-
-    Args:
-        storage: a rig.yaml, open for writing.
-        views: what the rig was computed from.
-    """
+    """Write the views."""
     storage.startWriteStruct(KEY, cv2.FileNode_MAP)
     storage.write("board", views.board or f"{views.columns}x{views.rows}")
     storage.write("board_columns", views.columns)

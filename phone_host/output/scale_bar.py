@@ -62,9 +62,6 @@ def ticks(low: float, high: float, place: Callable[[float], float], pitch: float
         high: greatest number on it; may be infinite.
         place: takes a number to its place on the scale, from 0 (bottom) to 1 (top).
         pitch: least distance of two ticks, as a share of the scale.
-
-    Returns:
-        Ticks that keep this distance, the roundest numbers first.
     """
     found: list[Tick] = []
     for numbers in _round_numbers(low, high):

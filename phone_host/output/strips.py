@@ -11,12 +11,7 @@ _VALUES: Final = 1 << 18
 
 
 def strips(rows: int, values_per_row: int) -> Iterator[slice]:
-    """Yield slices of rows from top to bottom, of about as many values each.
-
-    Args:
-        rows: of the image.
-        values_per_row: of one row.
-    """
+    """Yield slices of rows from top to bottom, of about as many values each."""
     step = max(1, _VALUES // max(1, values_per_row))
     for top in range(0, rows, step):
         yield slice(top, min(top + step, rows))

@@ -28,11 +28,7 @@ class Station:
 
 
 def tum_text(stations: Sequence[Station]) -> str:
-    """Write stations: stamp, place (m), rotation (x, y, z, w), from the camera to the world.
-
-    Args:
-        stations: in order.
-    """
+    """Write stations: stamp, place (m), rotation (x, y, z, w), from the camera to the world."""
     lines = ["# timestamp tx ty tz qx qy qz qw"]
     for station in stations:
         w, x, y, z = quaternion_of(station.R_world_camera)

@@ -32,9 +32,6 @@ def last_lines(off: tuple[str, ...]) -> bytes:
 
     A printer takes them whatever number it expects, and keeps them in its buffer while it waits for a temperature. They begin with an end
     of line, because the line before may have been cut.
-
-    Args:
-        off: what `heaters_off` returns.
     """
     chamber = () if _CHAMBER in off else (_CHAMBER,)
     return "".join(f"{text}\n" for text in ("", _WAKE, *off, *chamber, "M107")).encode()

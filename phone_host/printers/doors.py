@@ -68,11 +68,6 @@ def configured_door(uri: PrinterUri, table: object, file: Path) -> PrinterDoor:
 def key_of(uri: PrinterUri, table: object, file: Path | None) -> str:
     """Return the key that the settings file has for a printer; empty: it has none.
 
-    Args:
-        uri: where the printer is.
-        table: [printers] of the settings file: keys by address.
-        file: its name, for messages.
-
     Raises:
         SettingsError: the table is none, or holds what is no address or no key. No key is shown.
     """

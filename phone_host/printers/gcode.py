@@ -166,11 +166,6 @@ def name_of(text: str) -> str:
 def examine(file: Iterable[str], name: str, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
     """Read a whole file.
 
-    Args:
-        file: its lines.
-        name: of the file, for messages.
-        most_characters: that a line may have.
-
     Raises:
         DataError: a line is none of G-code, or nothing is sent.
     """

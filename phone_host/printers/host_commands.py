@@ -32,11 +32,7 @@ def host_command(text: str) -> str:
 
 
 def action_of(name: str) -> HostAction:
-    """Return what a command wants; NONE: it is for another host.
-
-    Args:
-        name: as `host_command` gives it.
-    """
+    """Return what a command wants; NONE: it is for another host."""
     return _ACTIONS.get(name, HostAction.NONE)
 
 
@@ -47,11 +43,6 @@ def ignored_note(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def passed_note(names: Sequence[str], whose: str) -> tuple[str, ...]:
-    """Return a sentence on commands in a file that somebody else prints; nothing if there are none.
-
-    Args:
-        names: of all commands in a file.
-        whose: who may obey them.
-    """
+    """Return a sentence on commands in a file that somebody else prints; nothing if there are none."""
     listed = ", ".join(f"@{name}" for name in names)
     return (f"its G-code has commands for a host ({listed}): {whose} obeys or ignores them",) if names else ()

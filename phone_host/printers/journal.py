@@ -84,11 +84,7 @@ class JournalEntry:
 
 
 class Journal:
-    """The entries of all prints of this machine.
-
-    Args:
-        folder: for them.
-    """
+    """The entries of all prints of this machine."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

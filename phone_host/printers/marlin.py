@@ -62,11 +62,6 @@ class MarlinSender:
         failure: why it failed; problems.NO_FAILURE: it did not.
         off: lines that switch off what the print heats.
         cooling: whether the printer has done them.
-
-    Args:
-        lines: of the print.
-        now_ns: when its port was opened.
-        options: how they are sent.
     """
 
     def __init__(self, lines: Iterator[Line], now_ns: int, options: SenderOptions | None = None) -> None:
@@ -130,12 +125,7 @@ class MarlinSender:
             self._end(Phase.CANCELLED)
 
     def heard(self, text: str, now_ns: int) -> HostAction:
-        """Take a line of the printer; return what its display wants, which is already done here.
-
-        Args:
-            text: without its end.
-            now_ns: when it came.
-        """
+        """Take a line of the printer; return what its display wants, which is already done here."""
         reply = read_reply(text)
         if not (reply.text or reply.name) or self.phase.is_over:
             return HostAction.NONE

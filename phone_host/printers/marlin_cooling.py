@@ -20,11 +20,7 @@ _NAMES: Final = {"T": "nozzle", "B": "bed", "C": "chamber"}
 
 
 class CoolingCheck:
-    """Watches the lines that cool.
-
-    Args:
-        off: lines that switch off what the print heats.
-    """
+    """Watches the lines that cool."""
 
     def __init__(self, off: tuple[str, ...]) -> None:
         self._off = off
@@ -83,11 +79,7 @@ class CoolingCheck:
             self._goals |= highest
 
     def lines_after(self, text: str) -> tuple[str, ...]:
-        """Return what is to be sent next because a line was answered.
-
-        Args:
-            text: of that line.
-        """
+        """Return what is to be sent next because a line was answered."""
         if not self._is_begun or text != _ASK:
             return ()
         self._asked += 1

@@ -155,13 +155,6 @@ def digest_header(challenge: str, user: str, password: str, asked: tuple[str, st
     """Return the header Authorization that answers a challenge of HTTP's digest authentication; empty: it is none that is spoken here.
 
     The password never travels. Source: RFC 7616, section 3.4.
-
-    Args:
-        challenge: the header WWW-Authenticate.
-        user: name.
-        password: of the user.
-        asked: method of the request, and its path and query.
-        client_nonce: a text that nobody can guess.
     """
     scheme, _, rest = challenge.strip().partition(" ")
     parts = {name.lower(): quoted or bare for name, quoted, bare in _PART.findall(rest)}

@@ -109,9 +109,6 @@ class _FileCommands:
     Attributes:
         message: why it pauses; empty: it does not.
         notes: on what was obeyed.
-
-    Args:
-        wishes: of the user, who can go on after a pause.
     """
 
     def __init__(self, wishes: Wishes) -> None:

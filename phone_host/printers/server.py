@@ -176,12 +176,7 @@ class Form:
 
 
 def form_of(name: str, fields: dict[str, str]) -> Form:
-    """Make a form.
-
-    Args:
-        name: of the file: plain characters alone.
-        fields: beside the file.
-    """
+    """Make a form."""
     head = "".join(
         f'--{_BOUNDARY}\r\nContent-Disposition: form-data; name="{key}"\r\n\r\n{value}\r\n'
         for key, value in fields.items()

@@ -60,11 +60,7 @@ class Answer:
 
 
 class Value:
-    """A part of what a server says. What is not there, or of another type, is empty, NaN or False.
-
-    Args:
-        value: of JSON.
-    """
+    """A part of what a server says. What is not there, or of another type, is empty, NaN or False."""
 
     def __init__(self, value: object) -> None:
         self._value = value

@@ -52,12 +52,7 @@ class _StoppedError(Exception):
 
 
 class ServerDoor:
-    """A printer behind a server.
-
-    Args:
-        server: it.
-        patience: how long it is waited for.
-    """
+    """A printer behind a server."""
 
     leaving_s = LEAVING_S
 

@@ -54,9 +54,6 @@ class ServerTalk:
 
     Attributes:
         server: its name for messages.
-
-    Args:
-        uri: where it is.
     """
 
     def __init__(self, uri: ServerUri) -> None:

@@ -143,9 +143,6 @@ def sliced(
         most_characters: that a line of it may have.
         tell: called several times a second; what it raises ends the slicer.
 
-    Returns:
-        What the file asks of the printer.
-
     Raises:
         UnavailableError: no slicer is installed.
         SettingsError: the profile is none of this slicer.

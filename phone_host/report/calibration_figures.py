@@ -30,11 +30,7 @@ _HALF: Final = 12
 
 
 def figures_card(found: SeriesRig) -> str:
-    """Make the card with the figures, their limits and what they mean.
-
-    Args:
-        found: the rig.
-    """
+    """Make the card with the figures, their limits and what they mean."""
     parts = (_rows(found), _rms(found), _baseline(found), _depths(found), _squares(found), _far(found))
     rows = [row for part in parts for row in part]
     meanings = "".join(
@@ -123,11 +119,7 @@ def millimetres(length_m: float) -> str:
 
 
 def camera_tables(found: SeriesRig) -> str:
-    """Make the card with both cameras' parameters and their relative pose.
-
-    Args:
-        found: the rig.
-    """
+    """Make the card with both cameras' parameters and their relative pose."""
     rig = found.rig
     sigmas = np.sqrt(np.diag(rig.covariance).clip(min=0))
     left, right = (_parameters(model, sigmas[at : at + _HALF]) for model, at in ((rig.left, 0), (rig.right, _HALF)))

@@ -35,9 +35,6 @@ _DEPTH_M: Final = 1.0
 def calibration_page(series: CalibrationSeries) -> str:
     """Make the page.
 
-    Args:
-        series: what it shows.
-
     Returns:
         An HTML document.
     """

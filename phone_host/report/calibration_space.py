@@ -25,12 +25,7 @@ _ABOVE: Final = (0.0, 90.0)
 
 
 def rig_card(series: CalibrationSeries, found: SeriesRig) -> str:
-    """Make the card.
-
-    Args:
-        series: whose boards are drawn.
-        found: whose cameras are.
-    """
+    """Make the card."""
     shapes = _boards(series)
     rig = found.rig
     away_m = float(np.median([np.linalg.norm(shape.lines[0][:-1].mean(axis=0)) for shape in shapes])) if shapes else 1.0

@@ -12,9 +12,6 @@ def cut_rows(cut: CutCounts, limits: DepthLimits | None) -> tuple[tuple[str, int
     Args:
         cut: the counts.
         limits: between which depths points were kept; None: none.
-
-    Returns:
-        Words and number of pixels.
     """
     far = f"farther than {distance_text(limits.far_m)}" if limits is not None else "too far"
     near = f"nearer than {distance_text(limits.near_m)}" if limits is not None and limits.near_m > 0 else "too near"

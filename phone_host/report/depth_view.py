@@ -92,9 +92,6 @@ def depth_view(processed: Processed, captions: tuple[str, str]) -> str:
 def cloud_view(processed: Processed) -> str:
     """Make the cloud that can be turned.
 
-    Args:
-        processed: a pair.
-
     Returns:
         HTML; empty if there is no point.
     """

@@ -16,11 +16,7 @@ _WORDS = {
 
 
 def drift_values(drift: Drift | None) -> dict[str, object] | None:
-    """Return the object `drift` of report.json; None without a rig.
-
-    Args:
-        drift: of the run.
-    """
+    """Return the object `drift` of report.json; None without a rig."""
     if drift is None:
         return None
     trend = drift.trend

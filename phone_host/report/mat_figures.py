@@ -61,12 +61,7 @@ class MatFigures:
 
 
 def mat_figures(mat: Mat, told: Sequence[MatSaid]) -> MatFigures:
-    """Sum up what a mat told.
-
-    Args:
-        mat: the mat.
-        told: of each pair that shows it, in order; one or more.
-    """
+    """Sum up what a mat told."""
     scale, square_m = told[-1].scale, mat.board.square_m
     left, right = np.median([each.seen for each in told], axis=0).tolist()
     return MatFigures(

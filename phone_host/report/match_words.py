@@ -18,11 +18,7 @@ _MIDDLE: Final = 128.0
 
 
 def corrected_values(report: MatchReport | None) -> dict[str, Any] | None:
-    """Make the object `corrected` of report.json; None if nothing is known.
-
-    Args:
-        report: what was corrected.
-    """
+    """Make the object `corrected` of report.json; None if nothing is known."""
     if report is None:
         return None
     counts = report.confidence_histogram

@@ -47,10 +47,6 @@ class ShownModel:
 def model_view(shown: ShownModel, file: str) -> str:
     """Make the model that can be turned.
 
-    Args:
-        shown: the surface.
-        file: the file beside the page that holds it.
-
     Returns:
         HTML; empty if there is no triangle.
     """

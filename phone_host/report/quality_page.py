@@ -49,9 +49,6 @@ _LEAST_OFFSET_MM, _LEAST_SCATTER_PX = 0.5, 0.1  # smaller differences are not wo
 def quality_page(report: QualityReport) -> str:
     """Make the page.
 
-    Args:
-        report: all pairs.
-
     Returns:
         An HTML document.
     """

@@ -185,9 +185,6 @@ def delay_series(
         timeless: whether their exposures are labels, because images were shown on demand.
         after_gap_ns: when the pairs were done before which the board was away: their wait is no starvation.
         statistics: of all pairs, if the ledgers are a sample of them: the percentiles that are told.
-
-    Returns:
-        The series of every delay.
     """
 
     def column(value: Callable[[PairLedger], int]) -> NDArray[np.float64]:
@@ -246,9 +243,6 @@ def delay_series(
 
 def page(data: PageData) -> str:
     """Make the whole page.
-
-    Args:
-        data: its content.
 
     Returns:
         An HTML document.

@@ -25,12 +25,7 @@ _MS: Final = 1e6
 
 
 def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
-    """Make the report.json object; times in ms, None where nothing was measured.
-
-    Args:
-        run: the run.
-        command: whose report it is.
-    """
+    """Make the report.json object; times in ms, None where nothing was measured."""
     return {
         "format_version": REPORT_FORMAT,
         "command": command,

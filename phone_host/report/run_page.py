@@ -122,11 +122,7 @@ def _sentence(words: str) -> str:
 
 
 def doubtful_pairs(run: RunSnapshot) -> dict[int, str]:
-    """Return why saved pairs are wrong, doubtful or perhaps so, by their number: what stood while they were taken.
-
-    Args:
-        run: the run.
-    """
+    """Return why saved pairs are wrong, doubtful or perhaps so, by their number: what stood while they were taken."""
     found: dict[int, str] = {}
     for item in sorted(history(run), key=lambda item: item.concern.is_failure):
         verdict, saved = ("wrong" if item.concern.is_failure else "doubtful"), saved_pairs(item, run.save_every)

@@ -12,12 +12,7 @@ _MOST_LINES: Final = 8
 
 
 def scan_lines(report: ScanReport, out: str) -> list[str]:
-    """Say what came of a scan.
-
-    Args:
-        report: of it.
-        out: the results folder, as the user named it.
-    """
+    """Say what came of a scan."""
     lines = [scan_verdict(report)[1]]
     model, settings = report.model, report.settings
     if settings is not None and model.triangles:
@@ -42,11 +37,7 @@ def scan_lines(report: ScanReport, out: str) -> list[str]:
 
 
 def mat_line(mat: MatFigures) -> str:
-    """Say what a mat told.
-
-    Args:
-        mat: its figures.
-    """
+    """Say what a mat told."""
     left, right = (f"{count:.0f}" for count in mat.seen)
     square = f"{mat.measured_m * 1e3:.2f} \u00b1 {mat.measured_sigma_m * 1e3:.2f} mm"
     return (

@@ -9,12 +9,7 @@ from phone_host.report.scan_report import ScanReport
 
 
 def next_commands(report: ScanReport, out: Path) -> tuple[NextCommand, ...]:
-    """Return the commands that export and print the model; none if it has no surface.
-
-    Args:
-        report: of the scan.
-        out: the results folder, as the user named it.
-    """
+    """Return the commands that export and print the model; none if it has no surface."""
     if not report.model.triangles:
         return ()
     export = (
@@ -33,11 +28,6 @@ def next_commands(report: ScanReport, out: Path) -> tuple[NextCommand, ...]:
 
 
 def next_lines(report: ScanReport, out: Path) -> list[str]:
-    """Say on a terminal what to do next.
-
-    Args:
-        report: of the scan.
-        out: the results folder, as the user named it.
-    """
+    """Say on a terminal what to do next."""
     commands = next_commands(report, out)
     return ["try next", *(f"  {each.command}" for each in commands)] if commands else []

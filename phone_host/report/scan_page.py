@@ -43,11 +43,6 @@ _SHARES: Final = (
 def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand, ...] = ()) -> str:
     """Make the page.
 
-    Args:
-        report: of the scan.
-        shown: its surface.
-        commands: what to do next.
-
     Returns:
         An HTML document.
     """

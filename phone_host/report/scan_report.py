@@ -164,24 +164,13 @@ class ScanReport:
 
 
 def stretches(pairs: Sequence[ScannedPair]) -> tuple[Stretch, ...]:
-    """Gather pairs in a row that are weak or lost for the same reason.
-
-    Args:
-        pairs: all, in order.
-    """
+    """Gather pairs in a row that are weak or lost for the same reason."""
     groups = groupby(pairs, lambda pair: (pair.is_fused, pair.weakness))
     return tuple(Stretch(tuple(group)) for (_, weakness), group in groups if weakness is not Weakness.NONE)
 
 
 def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
-    """Judge a scan.
-
-    Args:
-        report: of it.
-
-    Returns:
-        The verdict, and one sentence.
-    """
+    """Judge a scan."""
     if report.interrupted_of:
         verdict, sentence = scan_verdict(replace(report, interrupted_of=0))
         stopped = f"Interrupted after {len(report.pairs)} of {counted(report.interrupted_of, 'pair')}. "
@@ -231,11 +220,7 @@ def unseen_sentence(share: float, choice: UnseenSurface) -> str:
 
 
 def unseen_words(choice: UnseenSurface) -> str:
-    """Say what the files hold of the surface that no view measured, to follow `was never in view and`.
-
-    Args:
-        choice: what the files hold.
-    """
+    """Say what the files hold of the surface that no view measured, to follow `was never in view and`."""
     match choice:
         case UnseenSurface.FILL:
             return "is filled in"

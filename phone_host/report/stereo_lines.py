@@ -20,12 +20,7 @@ from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 
 def pair_lines(report: PairReport, out: str) -> list[str]:
-    """Say what came of one pair.
-
-    Args:
-        report: the pair.
-        out: its folder, as the user named it.
-    """
+    """Say what came of one pair."""
     search, written, total_ms = report.search, report.written, dict(report.stages_ms)["total"]
     how = [f"{size_text(report.rectified_px)} px", report.matcher]
     if search is not None and search.disparities:
@@ -51,12 +46,7 @@ def pair_lines(report: PairReport, out: str) -> list[str]:
 
 
 def set_lines(report: SetReport, out: str) -> list[str]:
-    """Say what came of several pairs.
-
-    Args:
-        report: all pairs.
-        out: the results folder, as the user named it.
-    """
+    """Say what came of several pairs."""
     names = told_names(report)
     lines = [_pair_line(pair, names[pair.name]) for pair in report.pairs]
     lines += [_shared_line(shared, report) for shared in shared_remarks(report)]

@@ -110,9 +110,6 @@ class StereoIndexData:
 def stereo_page(data: StereoPageData) -> str:
     """Make the page of one result.
 
-    Args:
-        data: its content.
-
     Returns:
         An HTML document.
     """
@@ -136,9 +133,6 @@ def stereo_page(data: StereoPageData) -> str:
 
 def stereo_index(data: StereoIndexData) -> str:
     """Make the page of several pairs; each picture leads to its pair's page.
-
-    Args:
-        data: its content.
 
     Returns:
         An HTML document.

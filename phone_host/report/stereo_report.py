@@ -187,11 +187,7 @@ class SharedRemark:
 
 
 def shared_remarks(report: SetReport) -> tuple[SharedRemark, ...]:
-    """Gather what is said of the computed pairs, each thing once, in the order of the pairs.
-
-    Args:
-        report: of all pairs.
-    """
+    """Gather what is said of the computed pairs, each thing once, in the order of the pairs."""
     names = told_names(report)
     kinds: dict[tuple[str, str], list[tuple[PairReport, Diagnostic]]] = {}
     for pair in report.computed:
@@ -209,33 +205,18 @@ def shared_remarks(report: SetReport) -> tuple[SharedRemark, ...]:
 
 
 def depth_png_words(missing: int) -> str:
-    """Say that depth.png does not hold all depths; empty if it does.
-
-    Args:
-        missing: how many it cannot hold.
-    """
+    """Say that depth.png does not hold all depths; empty if it does."""
     return f"{counted(missing, 'depth')} beyond 65.5 m (or below 1 mm) missing from depth.png" if missing else ""
 
 
 def told_names(report: SetReport) -> dict[str, str]:
-    """Return the pairs' names on a terminal, by their folders: a folder, with its left file where that is no number of the user's.
-
-    Args:
-        report: of several pairs.
-    """
+    """Return the pairs' names on a terminal, by their folders: a folder, with its left file where that is no number of the user's."""
     files = distinct_names([pair.left for pair in report.pairs])
     return {pair.name: pair.name if report.by_number else f"{pair.name} {files[pair.left]}" for pair in report.pairs}
 
 
 def distinct_names(paths: Sequence[str]) -> dict[str, str]:
-    """Shorten paths to what tells them apart: the files' names, with as many folders before them as that needs.
-
-    Args:
-        paths: of files, as users name them.
-
-    Returns:
-        The short name of each path.
-    """
+    """Shorten paths to what tells them apart: the files' names, with as many folders before them as that needs."""
     parts = {path: path.split("/") for path in paths}
     for count in range(1, 1 + max(map(len, parts.values()), default=0)):
         names = {path: "/".join(each[-count:]) for path, each in parts.items()}

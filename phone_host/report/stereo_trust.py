@@ -24,11 +24,7 @@ class PairTrust:
 
 
 def trust_values(trust: PairTrust) -> dict[str, object]:
-    """Return the `trust` block of report.json.
-
-    Args:
-        trust: of the pair.
-    """
+    """Return the `trust` block of report.json."""
     return {
         "grade": trust.answer.grade.value,
         "headline": trust.answer.sentence,

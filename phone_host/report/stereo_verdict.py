@@ -8,24 +8,13 @@ from phone_host.report.stereo_report import PairReport, SetReport
 
 
 def pair_verdict(pair: PairReport) -> tuple[Headline, str]:
-    """Return the verdict of one pair, and one sentence.
-
-    Args:
-        pair: its report.
-    """
+    """Return the verdict of one pair, and one sentence."""
     answer = pair.trust.answer
     return Headline(answer.grade.value), answer.sentence
 
 
 def set_verdict(report: SetReport) -> tuple[Headline, str]:
-    """Judge several pairs together.
-
-    Args:
-        report: all of them.
-
-    Returns:
-        The verdict, and one sentence.
-    """
+    """Judge several pairs together."""
     if report.interrupted_of:
         verdict, sentence = set_verdict(replace(report, interrupted_of=0))
         stopped = f"Interrupted after {len(report.pairs)} of {counted(report.interrupted_of, 'pair')}. Of these: "

@@ -40,15 +40,7 @@ class Course:
 
 
 def over_views(names: Sequence[str], courses: Sequence[Course], unit: str, label: str, width_px: int) -> str:
-    """Draw quantities over the views; 0 is always shown.
-
-    Args:
-        names: of the V views.
-        courses: the quantities.
-        unit: of the values.
-        label: what it shows, for screen readers.
-        width_px: width of the picture.
-    """
+    """Draw quantities over the views; 0 is always shown."""
     ends = [np.zeros(1), *(one.values + way * one.limits for one in courses for way in (-1, 1))]
     low, high = span(np.concatenate(ends))
     more = _MARGIN * (high - low)

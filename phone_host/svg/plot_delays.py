@@ -169,13 +169,6 @@ def lives(pairs: Sequence[Life], width_px: int) -> str:
     """Draw the lives of single pairs as bars on three lanes each, board, link and host, on one time axis from the exposure.
 
     The stages of processing are drawn below its bar. A bar too short to see is drawn two pixels wide.
-
-    Args:
-        pairs: in order.
-        width_px: width of the picture.
-
-    Returns:
-        An <svg> element.
     """
     longest = max((pair.ledger.end_to_end_ns for pair in pairs), default=0)
     if longest <= 0:

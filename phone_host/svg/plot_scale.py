@@ -41,11 +41,6 @@ def duration_text(ns: float) -> str:
 def ticks(low: float, high: float, count: int) -> list[float]:
     """Choose round numbers (1, 2 or 5 times a power of ten apart) inside an interval.
 
-    Args:
-        low: its lower end.
-        high: its upper end, above `low`.
-        count: about how many are wanted.
-
     Returns:
         The numbers, ascending; never more than `count` + 2.
     """

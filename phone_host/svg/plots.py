@@ -104,13 +104,6 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
 
     A bar reaches from p5 to p95, with a line at p50 and a tick at p99. A thin line reaches from the least value to a
     dot at the greatest.
-
-    Args:
-        groups: one or several (interfaces side by side), each with its quantities.
-        width_px: width of the picture.
-
-    Returns:
-        An <svg> element.
     """
     quantities = [quantity for group in groups for quantity in group.quantities]
     everything = [quantity.values_ns for quantity in quantities]
@@ -144,15 +137,7 @@ def distributions(groups: Sequence[Strips], width_px: int) -> str:
 
 
 def budgets(rows: Sequence[Budget], width_px: int) -> str:
-    """Plot horizontal bars whose shares add up, all on one axis from zero.
-
-    Args:
-        rows: one or several (interfaces side by side).
-        width_px: width of the picture.
-
-    Returns:
-        An <svg> element.
-    """
+    """Plot horizontal bars whose shares add up, all on one axis from zero."""
     totals = [math.fsum(share.value_ns for share in row.shares) for row in rows]
     if not totals or not max(totals) > 0.0:
         return empty(width_px, "nothing measured")

@@ -37,11 +37,6 @@ class Part:
 def require_count(name: str, count: int, limit: int = _MAX_PLACED) -> None:
     """Check a number of points or triangles before there is room made for them.
 
-    Args:
-        name: of the file, for errors.
-        count: of points or triangles.
-        limit: the most that is read.
-
     Raises:
         DataError: it is beyond the limit.
     """

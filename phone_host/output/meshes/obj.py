@@ -26,12 +26,7 @@ _FIGURE: Final = re.compile(rb"\s*(?:v|fo?)[\s\\]", re.IGNORECASE)
 
 
 def obj_bytes(solid: Solid, comment: str) -> bytes:
-    """Return an OBJ file in mm.
-
-    Args:
-        solid: the mesh.
-        comment: stands at its head, one line.
-    """
+    """Return an OBJ file in mm."""
     text = io.StringIO()
     text.write(f"# {comment}\n")
     points = solid.points_mm

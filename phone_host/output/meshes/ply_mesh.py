@@ -32,12 +32,7 @@ _FACE: Final = np.dtype([("corners", "u1"), ("numbers", "<i4", 3)])
 
 
 def ply_bytes(solid: Solid, comment: str) -> bytes:
-    """Return a binary PLY file in mm. Another point may come first than in the mesh: assimp 5.2 takes its first bytes for blanks.
-
-    Args:
-        solid: the mesh.
-        comment: stands in its header, one line.
-    """
+    """Return a binary PLY file in mm. Another point may come first than in the mesh: assimp 5.2 takes its first bytes for blanks."""
     solid = _begun_well(solid)
     vertices = np.empty(len(solid.points_m), _VERTEX)
     for channel, name in enumerate("xyz"):

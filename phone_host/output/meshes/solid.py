@@ -108,9 +108,6 @@ def used_points(triangles: NDArray[Any], count: int) -> tuple[NDArray[np.integer
     Args:
         triangles: (T, 3) numbers of points, 0..count-1.
         count: how many points there are.
-
-    Returns:
-        What selects the used points from an array of all, and the triangles with their new numbers.
     """
     if _FEW * triangles.size < count:
         few, numbers = np.unique(triangles, return_inverse=True)
@@ -124,11 +121,6 @@ def used_points(triangles: NDArray[Any], count: int) -> tuple[NDArray[np.integer
 
 def require_corners(name: str, corners: NDArray[np.integer[Any]], count: int) -> None:
     """Check that corners are points.
-
-    Args:
-        name: of the file, for errors.
-        corners: numbers of points, in any shape.
-        count: how many points there are.
 
     Raises:
         DataError: one of them is none.

@@ -88,9 +88,6 @@ def read_three_mf(content: bytes, name: str, unit_m: float | None) -> tuple[Soli
         name: of the file, for errors.
         unit_m: its unit, m; None: the one it names.
 
-    Returns:
-        The mesh, and its axes if it is one of ours and they were known.
-
     Raises:
         DataError: it is no 3MF file, is cut short, or holds no sound triangle.
     """

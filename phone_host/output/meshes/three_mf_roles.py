@@ -32,10 +32,6 @@ class Roles:
 def read_roles(archive: zipfile.ZipFile, name: str) -> Roles:
     """Read what the slicer says of the meshes; nothing where the file is of no slicer.
 
-    Args:
-        archive: the package, whose texts have bounded sizes.
-        name: of it, for errors.
-
     Raises:
         DataError: a part is to be cut away, which is not done here.
         ExpatError: what a slicer says is no XML.

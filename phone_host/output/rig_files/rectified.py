@@ -64,9 +64,6 @@ def middlebury_texts(rectification: Rectification, disparities: int) -> tuple[Ri
 def kitti_texts(rectification: Rectification) -> tuple[RigText, ...]:
     """Write the calib.txt of KITTI's odometry for the images that `stereo` rectifies with a rig: P0 and P1.
 
-    Args:
-        rectification: of the rig.
-
     Raises:
         DataError: the cameras stand one above the other.
     """
