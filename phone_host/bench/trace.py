@@ -20,12 +20,7 @@ _LANES: Final = 100
 
 @dataclass(frozen=True, slots=True)
 class TracedRun:
-    """A run to show.
-
-    Attributes:
-        name: name of the run.
-        ledgers: of its pairs, in the order in which they were done.
-    """
+    """A run to show."""
 
     name: str
     ledgers: tuple[PairLedger, ...]

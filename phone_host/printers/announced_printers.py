@@ -20,12 +20,7 @@ SERVICES: Final = (*_KINDS, _WEB)
 
 @dataclass(frozen=True, slots=True, order=True)
 class FoundPrinter:
-    """A printer that announces itself.
-
-    Attributes:
-        uri: for --printer.
-        name: its own, for people.
-    """
+    """A printer that announces itself."""
 
     uri: str
     name: str

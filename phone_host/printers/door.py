@@ -12,13 +12,7 @@ from phone_host.printers.progress import Ended, Progress
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What is to be printed.
-
-    Attributes:
-        gcode: its file.
-        name: for people, and for the file on a server.
-        facts: what it asks of the printer.
-    """
+    """What is to be printed."""
 
     gcode: Path
     name: str

@@ -86,12 +86,7 @@ class ServerUri:
 
 @dataclass(frozen=True, slots=True)
 class FileUri:
-    """No printer, but a file for one.
-
-    Attributes:
-        text: as the user wrote it.
-        path: of the file.
-    """
+    """No printer, but a file for one."""
 
     text: str
     path: str

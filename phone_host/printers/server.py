@@ -149,12 +149,7 @@ def pieces(gcode: Path, sent: Callable[[float], None]) -> Iterator[bytes]:
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A form with one file, as browsers send it (RFC 7578).
-
-    Attributes:
-        head: before the file.
-        tail: after it.
-    """
+    """A form with one file, as browsers send it (RFC 7578)."""
 
     head: bytes
     tail: bytes

@@ -50,11 +50,7 @@ class ServerLostError(UnavailableError):
 
 
 class ServerTalk:
-    """Asks one server.
-
-    Attributes:
-        server: its name for messages.
-    """
+    """Asks one server."""
 
     def __init__(self, uri: ServerUri) -> None:
         self._uri = uri

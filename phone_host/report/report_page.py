@@ -92,13 +92,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A small table, for example drops by reason.
-
-    Attributes:
-        title: its heading.
-        columns: column names.
-        rows: one text for each column.
-    """
+    """A small table, for example drops by reason."""
 
     title: str
     columns: tuple[str, ...]

@@ -35,11 +35,7 @@ _USUAL_SHARE: Final = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Pairs in a row that went alike.
-
-    Attributes:
-        pairs: in order.
-    """
+    """Pairs in a row that went alike."""
 
     pairs: tuple[ScannedPair, ...]
 

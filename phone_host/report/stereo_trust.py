@@ -10,13 +10,7 @@ from phone_host.report.run_json import concern_values, figure_values
 
 @dataclass(frozen=True, slots=True)
 class PairTrust:
-    """How far the depth of one pair can be trusted.
-
-    Attributes:
-        figures: density, left-right consistency and vertical error.
-        concerns: the doubts, gravest first.
-        answer: the headline.
-    """
+    """How far the depth of one pair can be trusted."""
 
     figures: ImageFigures
     concerns: tuple[Diagnostic, ...]

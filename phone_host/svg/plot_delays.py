@@ -154,12 +154,7 @@ def _steps(low: float, high: float) -> list[float]:
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """One pair whose life is drawn.
-
-    Attributes:
-        heading: text that says which one.
-        ledger: its marks.
-    """
+    """One pair whose life is drawn."""
 
     heading: str
     ledger: PairLedger

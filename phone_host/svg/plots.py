@@ -75,12 +75,7 @@ def mean_share(quantity: Quantity) -> Share:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """One bar made of shares that add up.
-
-    Attributes:
-        label: the name of the sum, for example an interface.
-        shares: in order.
-    """
+    """One bar made of shares that add up."""
 
     label: str
     shares: tuple[Share, ...]

@@ -9,12 +9,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True)
 class RigText:
-    """One file of an exported calibration.
-
-    Attributes:
-        name: its name, where needed with a folder: "cam0/sensor.yaml".
-        text: its content.
-    """
+    """One file of an exported calibration."""
 
     name: str
     text: str
