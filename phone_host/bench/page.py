@@ -27,12 +27,10 @@ from phone_host.bench.tables import (
 from phone_host.report.page_frame import HALF_PX, document, section, table, two_widths
 from phone_host.report.report_page import DelaySeries, Headline, delay_series, heading
 from phone_host.svg.plot_delays import Compared, Life, Scatter, against_bytes, compared, lives
-from phone_host.svg.plot_parts import STYLE, legend, point_legend
+from phone_host.svg.plot_parts import legend, point_legend, standalone
 from phone_host.svg.plots import Budget, Quantity, Strips, budgets, distributions, mean_share
 
 _FIGURE_PX: Final = 760
-_LETTER_PX: Final = 8
-"""Space for a letter of 12 px text, generous."""
 
 
 _FIT_WORDS: Final = (
@@ -82,26 +80,7 @@ def figure(results: Sequence[CaseResult], under: Conditions) -> str:
     day = under.date.partition("T")[0]
     emulated = ", emulated interfaces" if all(result.case.interface.profile for result in chosen) else ""
     title = f"Mean delays of a pair, {chosen[0].case.images}{emulated}, {day}"
-    return _standalone(title, [(one.label, one.colour) for one in measured[0][1].delays], budgets(bars, _FIGURE_PX))
-
-
-def _standalone(title: str, labels: Sequence[tuple[str, int]], plot: str) -> str:
-    """Make a plot into an SVG file of its own, with a title and a legend above it."""
-    width_px, height_px = (int(part) for part in plot.partition('viewBox="0 0 ')[2].partition('"')[0].split())
-    x, names = 0, ""
-    for name, colour in labels:
-        names += f'<rect x="{x}" y="32" width="11" height="11" rx="2" style="fill:var(--c{colour})"/>'
-        names += f'<text x="{x + 16}" y="42">{escape(name)}</text>'
-        x += 30 + _LETTER_PX * len(name)
-    colours = (
-        ":root{--ink:#1a1e24;--ink2:#5c6570;--line:#e2e6ea}"
-        "@media (prefers-color-scheme:dark){:root{--ink:#e9ecf0;--ink2:#9ba5b1;--line:#2b323b}}"
-    )
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox="0 0 {width_px} {height_px + 60}"><title>{escape(title)}</title>'
-        f'<style>{colours}{STYLE}</style><text class="strong" x="0" y="16" font-size="15" font-weight="600">{escape(title)}</text>{names}'
-        f'<svg y="60" width="{width_px}" height="{height_px}"{plot.removeprefix("<svg")}</svg>\n'
-    )
+    return standalone(title, [(one.label, one.colour) for one in measured[0][1].delays], budgets(bars, _FIGURE_PX))
 
 
 def _method(results: Sequence[CaseResult], under: Conditions) -> str:

@@ -13,11 +13,9 @@ from phone_host.model.calibration_series import CalibrationSeries, RectifiedView
 from phone_host.report.page_frame import HALF_PX, section, table, two_widths
 from phone_host.report.report_page import Picture, picture_uri
 from phone_host.svg.plot_arrows import Enlarged, SeenErrors, arrow_field, enlarged, photo_arrows
-from phone_host.svg.plot_course import Course, over_views
-from phone_host.svg.plot_coverage import coverage_map, tile_views
-from phone_host.svg.plot_depth import Mark, over_distance
+from phone_host.svg.plot_maps import TiltedBoard, coverage_map, tile_views, tilt_disc
+from phone_host.svg.plot_marks import Course, Mark, over_distance, over_views
 from phone_host.svg.plot_parts import legend, svg
-from phone_host.svg.plot_tilts import TiltedBoard, tilt_disc
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ _USUAL_PERCENT: Final = 75.0
 """The unit is that of the usual values: a few pairs of seconds among milliseconds do not make all others 0.0 s."""
 
 _DIGITS: Final = 4
-_NO_SCRIPT: Final = "The chart itself needs JavaScript; delays.jsonl has all values."
+_NO_SCRIPT: Final = "The chart itself needs JavaScript."
 
 
 class _Mark(Enum):
@@ -71,28 +71,38 @@ def stacked_chart(label: str, time_s: Values, layers: Sequence[Quantity]) -> str
     return _chart(label, words, lines, time_s, by=total)
 
 
-def dots_chart(time_s: Values, quantity: Quantity, band_ns: Values | None = None) -> str:
-    """Make a chart of one quantity of every pair as dots over time.
+def dots_chart(time_s: Values, *quantities: Quantity, band_ns: Values | None = None) -> str:
+    """Make a chart of quantities as dots over time.
 
     Args:
-        time_s: (N,) when each pair was done, ascending, s.
-        quantity: N values.
+        time_s: (N,) when each value was measured, ascending, s.
+        quantities: N values each, at least one; of several, only one has a value at each time.
         band_ns: (N,) half-width of a band around zero, drawn behind the dots, ns.
 
     Returns:
         HTML for a page that runs Script.CHARTS.
     """
-    values = quantity.values_ns
-    known = values[np.isfinite(values)]
-    if not known.size:
+    known = [one for one in quantities if np.isfinite(one.values_ns).any()]
+    if not known:
         return _nothing()
-    p50, least, most = (duration_text(float(value)) for value in (np.median(known), known.min(), known.max()))
+    first, *others = known
+    by = first.values_ns
+    for one in others:
+        by = np.where(np.isnan(by), one.values_ns, by)
+    names = [f"{one.label}: median" for one in known] if others else ["Median"]
+    words = " ".join(f"{name} {_spread_words(one.values_ns)}." for name, one in zip(names, known, strict=True))
     edges = () if band_ns is None else (band_ns, -band_ns)
     lines = [
-        _Line(quantity.label, quantity.colour, _Mark.DOTS, values),
-        *(_Line("uncertainty", quantity.colour, _Mark.EDGE, edge) for edge in edges),
+        *(_Line(one.label, one.colour, _Mark.DOTS, one.values_ns) for one in known),
+        *(_Line("uncertainty", first.colour, _Mark.EDGE, edge) for edge in edges),
     ]
-    return _chart(f"{quantity.label} over time", f"Median {p50}, between {least} and {most}.", lines, time_s, by=values)
+    return _chart(f"{', '.join(one.label for one in known)} over time", words, lines, time_s, by=by)
+
+
+def _spread_words(values: Values) -> str:
+    found = values[np.isfinite(values)]
+    p50, least, most = (duration_text(float(value)) for value in (np.median(found), found.min(), found.max()))
+    return f"{p50}, between {least} and {most}"
 
 
 def _nothing() -> str:

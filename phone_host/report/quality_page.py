@@ -25,8 +25,8 @@ from phone_host.report.quality_report import (
 )
 from phone_host.report.report_page import Figure, Picture, figures_row, heading, picture_uri
 from phone_host.report.stereo_report import FailedPair
-from phone_host.svg.plot_depth import Curve, Mark, over_distance, span_m
-from phone_host.svg.plot_tiles import tile_map
+from phone_host.svg.plot_maps import tile_map
+from phone_host.svg.plot_marks import Curve, Mark, over_distance, span_m
 
 _MEANINGS: Final = (
     ("plane-fit RMS", "how far depths lie off the fitted plane, along the optical axis (root mean square)"),

@@ -27,7 +27,7 @@ from phone_host.report.scan_report import (
     unseen_words,
 )
 from phone_host.scan.scanned import ScannedPair
-from phone_host.svg.plot_course import Course, over_views
+from phone_host.svg.plot_marks import Course, over_views
 from phone_host.svg.plot_parts import legend
 
 _FITS: Final = (

@@ -1,7 +1,4 @@
-"""Small errors over an image as arrows, enlarged, with their scale. Pure: values in, SVG out.
-
-It stays SVG: arrows have places in an image; uPlot draws series over an axis.
-"""
+"""Small errors over an image as arrows, enlarged, with their scale. Pure: values in, SVG out."""
 
 import math
 from dataclasses import dataclass

@@ -1,8 +1,4 @@
-"""Plots of the delay benchmark as inline SVG: delay against bytes with its line, and the lives of single pairs. Pure; see `plots` for the rules.
-
-They stay SVG: no axis is time. Dots differ in shape as well as in colour and each has a name, lives are bars in lanes; uPlot draws
-series over an ordered axis.
-"""
+"""Plots of the delay benchmark as inline SVG: delay against bytes with its line, and the lives of single pairs. Pure; see `plots` for the rules."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +16,10 @@ from phone_host.svg.plot_parts import (
     TOP_PX,
     axes,
     empty,
+    frame,
     point,
     svg,
+    ticks_below,
     triangle,
 )
 from phone_host.svg.plot_scale import Linear, Log, Values, duration_text, duration_unit, number_text, span, ticks
@@ -69,10 +67,11 @@ def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
         An <svg> element.
     """
     size, delay, fit = scatter.size_bytes, scatter.delay_ns, scatter.fit
-    x = Linear(low=0.0, high=1.05 * span(size)[1], start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
-    wanted = max(2.5 * float(np.percentile(delay, 75)), 1.25 * fit.delay_ns(x.high) if fit.ns_per_byte > 0 else 0.0)
+    most = 1.05 * span(size)[1]
+    wanted = max(2.5 * float(np.percentile(delay, 75)), 1.25 * fit.delay_ns(most) if fit.ns_per_byte > 0 else 0.0)
     top = min(1.06 * float(delay.max()), wanted)
-    y = Linear(low=0.0, high=max(1.0, top), start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
+    x, y = frame((width_px, height_px), (0.0, most), (0.0, max(1.0, top)))
+    unit_ns, unit = duration_unit(y.high)
     dots = []
     every = max(1, -(-size.size // _MOST_DOTS))
     late = set(np.flatnonzero(delay > y.high).tolist())
@@ -88,12 +87,9 @@ def against_bytes(scatter: Scatter, width_px: int, height_px: int = 240) -> str:
         ends = ((at, fit.delay_ns(at)) for at in (0.0, x.high))
         (x0, y0), (x1, y1) = ((x.px(at), y.px(max(0.0, value))) for at, value in ends)
         line = f'<path class="mark fit" d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>'
-    return svg(
-        width_px,
-        height_px,
-        "propagation against bytes",
-        [axes(x, y, (width_px, height_px), "size of the frame, kB", 1e3), *dots, line],
-    )
+    around = axes((width_px, height_px), y, unit, "size of the frame, kB", per=unit_ns)
+    below = ticks_below((width_px, height_px), x, 1e3)
+    return svg(width_px, height_px, "propagation against bytes", [around, below, *dots, line])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

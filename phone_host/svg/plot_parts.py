@@ -1,5 +1,7 @@
 """The parts of all plots: colours, marks, axes, the frame around them. Pure: values in, SVG out.
 
+Everything that static pages plot is drawn here, but for series over time, which `report.chart_view` hands to the live page's chart (decision 0144).
+
 There are eight colours. Where more things than that must differ, further ones take the same colours with another shape
 of mark, so that the first 32 differ.
 """
@@ -8,7 +10,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Final
 
-from phone_host.svg.plot_scale import Linear, duration_unit, number_text, ticks
+from phone_host.svg.plot_scale import Linear, Values, number_text, span, ticks
 
 # Okabe and Ito's palette, safe for all common kinds of colour blindness ("Color Universal Design", 2008); the last
 # colour is grey.
@@ -34,6 +36,9 @@ LEFT_PX, RIGHT_PX, TOP_PX, BOTTOM_PX = 52, 10, 24, 34
 
 DARK_COLOURS: Final = (2, 4, 5)
 """The colours on which text is light in light mode."""
+
+LETTER_PX: Final = 8
+"""Space for a letter of 12 px text, generous."""
 
 _COLOURS: Final = 8
 
@@ -105,31 +110,54 @@ def point_legend(labels: Sequence[tuple[str, int]]) -> str:
     return f'<ul class="legend">{items}</ul>'
 
 
-def axes(x: Linear, y: Linear, size_px: tuple[int, int], name: str, unit: float = 1.0) -> str:
-    """Draw grid, tick labels and names of both axes; the vertical one is a duration.
+def frame(size_px: tuple[int, int], ends_x: tuple[float, float], ends_y: tuple[float, float]) -> tuple[Linear, Linear]:
+    """Return the scales of a plot's two axes, which leave room for its margins."""
+    width_px, height_px = size_px
+    x = Linear(low=ends_x[0], high=ends_x[1], start_px=LEFT_PX, end_px=width_px - RIGHT_PX)
+    return x, Linear(low=ends_y[0], high=ends_y[1], start_px=height_px - BOTTOM_PX, end_px=TOP_PX)
+
+
+def wider(values: Values, share: float) -> tuple[float, float]:
+    """Return the least and the greatest value, moved apart by a share of their distance, so that no mark lies on the frame."""
+    low, high = span(values)
+    more = share * (high - low)
+    return low - more, high + more
+
+
+def axes(size_px: tuple[int, int], y: Linear, unit: str, name: str, *, per: float = 1.0) -> str:
+    """Draw the grid, tick labels and names of both axes; the ticks of the horizontal one are `ticks_below`.
 
     Args:
-        x: scale of the horizontal axis.
-        y: scale of the vertical axis, ns.
         size_px: width and height of the picture.
+        y: scale of the vertical axis.
+        unit: symbol of its unit, plain text.
         name: name of the horizontal axis, plain text.
-        unit: the unit of its labels, in the unit of `x`.
+        per: the unit of the vertical axis' labels, in the unit of `y`.
     """
     width_px, height_px = size_px
-    unit_ns, symbol = duration_unit(max(abs(y.low), abs(y.high)))
-    parts = [f'<text x="0" y="11">{symbol}</text>']
-    for value in ticks(y.low / unit_ns, y.high / unit_ns, 4):
-        level = y.px(value * unit_ns)
-        kind = "axis" if value == 0.0 else "grid"
+    parts = [f'<text x="0" y="11">{escape(unit)}</text>']
+    for value in ticks(y.low / per, y.high / per, 4):
+        level = y.px(value * per)
+        kind = "axis" if abs(value) < 1e-12 else "grid"
         parts.append(f'<path class="{kind}" d="M{LEFT_PX} {level:.1f}H{width_px - RIGHT_PX}"/>')
         parts.append(f'<text x="{LEFT_PX - 6}" y="{level + 4:.1f}" text-anchor="end">{number_text(value)}</text>')
-    bottom = height_px - BOTTOM_PX
-    for value in ticks(x.low / unit, x.high / unit, max(2, width_px // 110)):
-        at = x.px(value * unit)
-        parts.append(f'<path class="axis" d="M{at:.1f} {bottom}v4"/>')
-        parts.append(f'<text x="{at:.1f}" y="{bottom + 16}" text-anchor="middle">{number_text(value)}</text>')
     parts.append(f'<text x="{width_px - RIGHT_PX}" y="{height_px - 3}" text-anchor="end">{escape(name)}</text>')
     return "".join(parts)
+
+
+def ticks_below(size_px: tuple[int, int], x: Linear, per: float = 1.0) -> str:
+    """Draw the ticks of the horizontal axis and their numbers, in a unit of so much."""
+    bottom = size_px[1] - BOTTOM_PX
+    values = ticks(x.low / per, x.high / per, max(2, size_px[0] // 110))
+    return "".join(tick(x.px(value * per), bottom, number_text(value)) for value in values)
+
+
+def tick(at_px: float, bottom_px: float, label: str) -> str:
+    """Draw a tick of the horizontal axis with its label, plain text."""
+    return (
+        f'<path class="axis" d="M{at_px:.1f} {bottom_px}v4"/>'
+        f'<text x="{at_px:.1f}" y="{bottom_px + 16}" text-anchor="middle">{escape(label)}</text>'
+    )
 
 
 def svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> str:
@@ -137,6 +165,25 @@ def svg(width_px: int, height_px: float, label: str, parts: Sequence[str]) -> st
     return (
         f'<svg class="plot" role="img" aria-label="{escape(label)}" viewBox="0 0 {width_px} {height_px:.0f}">'
         f"{''.join(parts)}</svg>"
+    )
+
+
+def standalone(title: str, labels: Sequence[tuple[str, int]], plot: str) -> str:
+    """Make a plot into an SVG file of its own, with a title and a legend above it."""
+    width_px, height_px = (int(part) for part in plot.partition('viewBox="0 0 ')[2].partition('"')[0].split())
+    x, names = 0, ""
+    for name, colour in labels:
+        names += f'<rect x="{x}" y="32" width="11" height="11" rx="2" style="fill:var(--c{colour})"/>'
+        names += f'<text x="{x + 16}" y="42">{escape(name)}</text>'
+        x += 30 + LETTER_PX * len(name)
+    colours = (
+        ":root{--ground:#fff;--ink:#1a1e24;--ink2:#5c6570;--line:#e2e6ea}"
+        "@media (prefers-color-scheme:dark){:root{--ground:#101318;--ink:#e9ecf0;--ink2:#9ba5b1;--line:#2b323b}}"
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox="0 0 {width_px} {height_px + 60}"><title>{escape(title)}</title>'
+        f'<style>{colours}{STYLE}</style><rect width="100%" height="100%" style="fill:var(--ground)"/><text class="strong" x="0" y="16" font-size="15" font-weight="600">{escape(title)}</text>{names}'
+        f'<svg y="60" width="{width_px}" height="{height_px}"{plot.removeprefix("<svg")}</svg>\n'
     )
 
 

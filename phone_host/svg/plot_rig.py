@@ -1,7 +1,4 @@
-"""Cameras and boards in space, seen from a direction. Pure: values in, SVG out.
-
-It stays SVG: a drawing in space has no axis to zoom; uPlot draws series over one.
-"""
+"""Cameras and boards in space, seen from a direction. Pure: values in, SVG out."""
 
 import math
 from collections.abc import Sequence

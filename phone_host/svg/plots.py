@@ -1,7 +1,5 @@
 """Plots as inline SVG: distributions of delays, and their shares. Pure: values in, text out.
 
-They stay SVG: uPlot has no bars of percentiles and no bars side by side, a SVG file is made of them, and nothing is to be zoomed.
-
 Every plot is drawn for a given width in CSS pixels and is not meant to be scaled much, so that its text stays legible.
 Colours are the CSS variables --c0 to --c7 and a few of the page's own (see `plot_parts.STYLE`), so that one SVG serves
 light and dark mode. What a mark means is in its <title>, which browsers show when the pointer rests on it.
@@ -16,12 +14,10 @@ from html import escape
 
 import numpy as np
 
-from phone_host.svg.plot_parts import DARK_COLOURS, empty, hit, svg
+from phone_host.svg.plot_parts import DARK_COLOURS, LETTER_PX, empty, hit, svg
 from phone_host.svg.plot_scale import Linear, Values, duration_text, duration_unit, log_scale
 
 _ROOM_FOR_MAX_PX = 440
-_LETTER_PX = 8
-"""Space for a letter of 12 px text, generous."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +150,7 @@ def budgets(rows: Sequence[Budget], width_px: int) -> str:
                 f'style="fill:var(--c{share.colour})"><title>{escape(label)}</title></rect>'
             )
             words = f"{share.label} {duration_text(share.value_ns)}"
-            if right - left > _LETTER_PX * len(words):
+            if right - left > LETTER_PX * len(words):
                 pale = " pale" if share.colour in DARK_COLOURS else ""
                 parts.append(f'<text class="on{pale}" x="{left + 7:.1f}" y="{top + 37}">{escape(words)}</text>')
     return svg(width_px, 56.0 * len(rows) - 6.0, "shares of the delays", parts)

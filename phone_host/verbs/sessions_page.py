@@ -8,9 +8,10 @@ import numpy as np
 from common.recording.recorded import Recorded
 from common.words import counted
 from phone_host.recording.session_info import SessionInfo, skews_ms
-from phone_host.report.page_frame import document, section, table, two_widths
-from phone_host.svg.plot_parts import legend
-from phone_host.svg.plot_times import Durations, over_time
+from phone_host.report.chart_view import dots_chart
+from phone_host.report.page_frame import document, section, table
+from phone_host.report.page_script import Script
+from phone_host.svg.plots import Quantity
 
 _LONGEST = 20
 
@@ -41,13 +42,12 @@ def info_page(name: str, recorded: Recorded, info: SessionInfo) -> str:
         parts.append(section("Longest gaps", "", table(["topic", "at, s", "lasted, s", "images missing"], gaps)))
     if skews := skews_ms(recorded):
         at_s, values = (np.array(column, np.float64) for column in zip(*skews, strict=True))
-        one = Durations("left behind right", 0, at_s, values * 1e6)
-        plot = two_widths(lambda px: over_time([one], "time skew over time", px))
+        plot = dots_chart(at_s, Quantity(label="left behind right", values_ns=values * 1e6, colour=0))
         parts.append(section("Time skew", "Exposure of each left image minus that of the nearest right one.", plot))
     held = [[topic, str(count)] for topic, count in info.messages]
     held += [[name, counted(size, "byte")] for name, size in info.attachments]
     parts.append(section("Contents", "", table(["topic or file", "messages or size"], held)))
-    return document(f"{name}: recording", "".join(parts))
+    return document(f"{name}: recording", "".join(parts), Script.CHARTS)
 
 
 def _streams(info: SessionInfo) -> str:
@@ -67,15 +67,18 @@ def _streams(info: SessionInfo) -> str:
 
 
 def _between(recorded: Recorded) -> str:
-    series = []
     zero_ns = min(shown[0].image.stamp_ns for shown in recorded.images.values())
-    for number, (topic, shown) in enumerate(sorted(recorded.images.items())):
-        stamps = [one.image.stamp_ns for one in shown]
-        at_s = np.array([(stamp - zero_ns) / 1e9 for stamp in stamps[1:]], np.float64)
-        between = np.array([after - before for before, after in pairwise(stamps)], np.float64)
-        series.append(Durations(topic, number, at_s, between))
-    plot = two_widths(lambda px: over_time(series, "time between two images", px))
-    return legend([(one.label, one.colour) for one in series]) + plot
+    topics = sorted(recorded.images)
+    stamps = ([one.image.stamp_ns for one in recorded.images[topic]] for topic in topics)
+    spans = [(end, end - start, number) for number, each in enumerate(stamps) for start, end in pairwise(each)]
+    ends_ns, between_ns, numbers = np.array(sorted(spans), np.int64).reshape(-1, 3).T
+    return dots_chart(
+        (ends_ns - zero_ns) / 1e9,
+        *(
+            Quantity(label=topic, values_ns=np.where(numbers == number, between_ns, np.nan), colour=number)
+            for number, topic in enumerate(topics)
+        ),
+    )
 
 
 def _gaps(info: SessionInfo) -> list[list[str]]:

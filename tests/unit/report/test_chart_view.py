@@ -1,6 +1,7 @@
 """Charts of static pages: the script gets what was measured, gaps stay gaps, extremes survive, and a sentence says the most of it."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,12 +38,23 @@ def test_the_script_gets_the_values_and_the_reader_a_sentence() -> None:
 def test_a_band_has_two_edges() -> None:
     """Dots come first, then the band's edges above and below zero; what was not measured is null, and no part of the sentence."""
     skew = Quantity(label="skew", values_ns=np.array([-7e3, np.nan, 9e3]), colour=5)
-    chart = dots_chart(np.arange(3.0), skew, np.array([2e3, 4e3, 2e3]))
+    chart = dots_chart(np.arange(3.0), skew, band_ns=np.array([2e3, 4e3, 2e3]))
     found = given(chart)
     assert [line["mark"] for line in found["lines"]] == ["dots", "edge", "edge"]
     assert (found["unit"], found["stacked"]) == ("µs", False)
     assert found["columns"][1:] == [[-7.0, None, 9.0], [2.0, 4.0, 2.0], [-2.0, -4.0, -2.0]]
     assert "Median 1.00 µs, between -7.00 µs and 9.00 µs." in Page(chart).words.replace("\u202f", " ")
+
+
+def test_series_with_times_of_their_own_share_a_chart() -> None:
+    """Where one has a value the other has none; each has its sentence, and one without any value is left out."""
+    left = Quantity(label="left", values_ns=np.array([1e6, np.nan, 3e6]), colour=0)
+    right = Quantity(label="right", values_ns=np.array([np.nan, 5e6, np.nan]), colour=1)
+    chart = dots_chart(np.arange(3.0), left, right, replace(left, label="none", values_ns=np.full(3, np.nan)))
+    assert given(chart)["columns"] == [[0.0, 1.0, 2.0], [1.0, None, 3.0], [None, 5.0, None]]
+    words = Page(chart).words.replace("\u202f", " ")
+    assert "left: median 2.00 ms, between 1.00 ms and 3.00 ms. right: median 5.00 ms" in words
+    assert "none" not in words
 
 
 def test_a_pause_is_a_gap() -> None:

@@ -27,7 +27,7 @@ from phone_host.report.stereo_lines import cut_lines, pair_lines, set_lines
 from phone_host.report.stereo_page import stereo_page, thumbnail
 from phone_host.report.stereo_report import FailedPair, PairReport, SetReport
 from phone_host.report.stereo_trust import PairTrust
-from phone_host.svg.plot_depth import Mark, over_distance
+from phone_host.svg.plot_marks import Mark, over_distance
 from tests.support.budget_accounts import ACCOUNT, BEST
 from tests.support.html import Page
 from tests.support.quality_pages import pair, quality, report
