@@ -10,7 +10,7 @@ import { execFileSync } from 'node:child_process';
 import { createHash } from 'node:crypto';
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { dirname, join, relative, resolve } from 'node:path';
+import { basename, dirname, join, relative, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { brotliCompressSync, constants, gzipSync } from 'node:zlib';
 
@@ -18,13 +18,16 @@ const ESBUILD = 'esbuild@0.28.2';
 const HERE = resolve(dirname(fileURLToPath(import.meta.url)), '..');
 const PINS = join(HERE, 'phone_host/web/vendor/versions.json');
 
-/** Modules made: from which entry, in which form, where to. The page's own modules are shipped as they are written. */
+/**
+ * Libraries made, which name themselves in `globalThis`: the live page imports them, static pages hold the same bytes in a script of their own.
+ * Then what static pages run of our modules. The live page loads those as they are written.
+ */
 const MADE = [
-  { entry: 'phone_host/web/vendor/three.entry.js', of: 'three', format: 'esm', to: 'phone_host/web/page/vendor/three.js' },
-  { entry: 'npm:uplot/dist/uPlot.esm.js', of: 'uplot', format: 'esm', to: 'phone_host/web/page/vendor/uplot.js' },
-  { entry: 'phone_host/web/page/static_depth.js', of: 'three', format: 'iife', to: 'phone_host/report/page_depth.js' },
-  { entry: 'phone_host/web/page/static_charts.js', of: 'uplot', format: 'iife', to: 'phone_host/report/page_charts.js' },
-  { entry: 'phone_host/web/page/static_copy.js', of: '', format: 'iife', to: 'phone_host/report/page_copy.js' },
+  { entry: 'phone_host/web/vendor/three.entry.js', of: 'three', names: 'three', to: 'phone_host/web/page/vendor/three.js' },
+  { entry: 'npm:uplot/dist/uPlot.esm.js', of: 'uplot', names: 'uPlot', to: 'phone_host/web/page/vendor/uplot.js' },
+  { entry: 'static_depth.js', to: 'phone_host/report/page_depth.js' },
+  { entry: 'static_charts.js', to: 'phone_host/report/page_charts.js' },
+  { entry: 'static_copy.js', to: 'phone_host/report/page_copy.js' },
 ];
 
 /** Files that go to the page unchanged. */
@@ -69,20 +72,29 @@ function fetch(sources) {
   }
 }
 
-/** Bundle one entry. The licence's notice stays in it. Return our own files in it. */
-function bundle({ entry, of, format, to }, sources, root) {
+/** Copy our modules, with nothing in place of the libraries. Return where they are. */
+function withoutLibraries(sources) {
+  const folder = join(sources, 'page');
+  cpSync(join(HERE, 'phone_host/web/page'), folder, { recursive: true });
+  for (const { to } of MADE.filter(({ of }) => of)) writeFileSync(join(sources, 'page/vendor', basename(to)), '');
+  return folder;
+}
+
+/** Bundle one entry. A library's licence's notice stays in it. Return our own files in it. */
+function bundle({ entry, of, names, to }, sources, root, page) {
   const holder = of && readFileSync(join(sources, of, 'LICENSE'), 'utf8').match(/Copyright.*/)[0].replace(/ ?[^ -~]+/g, '');
   const notice = of && `/* ${of} ${pins().packages[of].version}, MIT License, ${holder} */`;
   const meta = join(sources, 'meta.json');
   const words = [
-    '--yes', ESBUILD, place(entry, sources), '--bundle', '--minify', `--format=${format}`, '--target=es2022', '--charset=ascii',
-    '--legal-comments=none', ...(notice ? [`--banner:js=${notice}`] : []), `--outfile=${join(root, to)}`, `--metafile=${meta}`,
+    '--yes', ESBUILD, of ? place(entry, sources) : join(page, entry), '--bundle', '--minify', '--format=iife', '--target=es2022', '--charset=ascii',
+    '--legal-comments=none', ...(of ? [`--banner:js=${notice}`, `--global-name=${names}`, `--footer:js=globalThis.${names}=${names}.default??${names};`] : []), `--outfile=${join(root, to)}`, `--metafile=${meta}`,
     '--log-level=warning', '--loader:.css=text',
     `--alias:three=${join(sources, 'three/build/three.module.js')}`,
     `--alias:three/addons/controls/OrbitControls.js=${join(sources, 'three/examples/jsm/controls/OrbitControls.js')}`,
   ];
   npm('npx', ...words);
-  const inputs = Object.keys(JSON.parse(readFileSync(meta, 'utf8')).inputs).map((one) => relative(HERE, resolve(tmpdir(), one)));
+  const inputs = Object.keys(JSON.parse(readFileSync(meta, 'utf8')).inputs)
+    .map((one) => relative(HERE, resolve(tmpdir(), one).replace(page, join(HERE, 'phone_host/web/page'))));
   return inputs.filter((one) => !one.startsWith('..'));
 }
 
@@ -98,8 +110,9 @@ function build(sources, root) {
     cpSync(place(from, sources), join(root, to));
     note(to);
   }
+  const page = withoutLibraries(sources);
   for (const each of MADE) {
-    for (const path of bundle(each, sources, root)) own[path] = sha256(readFileSync(join(HERE, path)));
+    for (const path of bundle(each, sources, root, page)) own[path] = sha256(readFileSync(join(HERE, path)));
     note(each.to);
   }
   for (const path of Object.keys(made).filter((one) => one.startsWith('phone_host/web/page/') && !one.includes('LICENSE'))) {

@@ -1,7 +1,7 @@
 """The scripts of static pages: the live page's own modules, prebuilt, so that the project has one viewer. Light.
 
-A page holds its script as text and names the text's hash in its policy. The scripts take all values from attributes and
-load nothing. `make vendor` builds them; a test compares their hashes.
+A page holds its script as text and names the text's hash in its policy: the library that the live page loads, too, then what is built of
+our modules. The scripts take all values from attributes and load nothing. `make vendor` builds them; a test compares their hashes.
 """
 
 import base64
@@ -12,11 +12,11 @@ from importlib import resources
 
 
 class Script(Enum):
-    """What a page needs; the value is the file beside this module."""
+    """What a page needs; the value is its files in this package."""
 
-    CHARTS = "page_charts.js"
-    COPY = "page_copy.js"
-    DEPTH = "page_depth.js"
+    CHARTS = ("web/page/vendor/uplot.js", "report/page_charts.js")
+    COPY = ("report/page_copy.js",)
+    DEPTH = ("web/page/vendor/three.js", "report/page_depth.js")
 
 
 @cache
@@ -26,7 +26,8 @@ def script(kind: Script) -> str:
     Args:
         kind: CHARTS draws charts; COPY connects buttons that copy commands; DEPTH reads depth and turns the cloud, too.
     """
-    return resources.files(__package__).joinpath(kind.value).read_text("ascii")
+    package = resources.files("phone_host")
+    return "".join(package.joinpath(file).read_text("ascii") for file in kind.value)
 
 
 @cache

@@ -1,7 +1,9 @@
 // One chart over time, by uPlot: the same on the live page and on static ones. A pointer or arrow keys read values, dragging or
 // plus and minus zoom, a double click or Escape goes back, a name of the legend hides its line. The cursor is shared.
 
-import uPlot from './vendor/uplot.js';
+import './vendor/uplot.js';
+
+const { uPlot } = globalThis;
 
 /**
  * @typedef {(number | null)[]} Column

@@ -5,8 +5,10 @@
 
 import { lengthOf, middleOf, places } from './depth.js';
 import { RAMP } from './ramp.js';
-import * as three from './vendor/three.js';
+import './vendor/three.js';
 import { opaque, Viewer } from './viewer.js';
+
+const { three } = globalThis;
 
 /** @typedef {import('./depth.js').Grid} Grid */
 /** @typedef {import('./depth.js').Geometry} Geometry */

@@ -1,6 +1,8 @@
 // A box around a surface that is pulled by its six faces. Lengths are m, places in the axes of the model.
 
-import { Vector3 } from './vendor/three.js';
+import './vendor/three.js';
+
+const { Vector3 } = globalThis.three;
 
 /** @typedef {{low: number[], high: number[]}} Box */
 

@@ -1,6 +1,8 @@
 // The scale bar and the axes over a cloud, on a canvas of their own.
 
-import { Vector3 } from './vendor/three.js';
+import './vendor/three.js';
+
+const { Vector3 } = globalThis.three;
 
 /** Ways of the axes inside the viewer: a camera's, and those of what stands on a mat, whose Z points up. */
 const WAYS = { camera: [[1, 0, 0], [0, -1, 0], [0, 0, -1]], mat: [[1, 0, 0], [0, 0, -1], [0, 1, 0]] };
@@ -27,7 +29,7 @@ export class CloudLegend {
   }
 
   /**
-   * @param {import('./vendor/three.js').PerspectiveCamera} camera
+   * @param {any} camera
    * @param {Vector3} target - where the scale holds
    * @param {number} zoom - px of the page per unit of tangent @param {number} ratio - device pixels per px
    */
@@ -63,7 +65,7 @@ export class CloudLegend {
     this.words(lengthWords(length), end + 7, y - 1, ink);
   }
 
-  /** @param {import('./vendor/three.js').PerspectiveCamera} camera @param {number} w @param {number} h */
+  /** @param {any} camera @param {number} w @param {number} h */
   axes(camera, w, h) {
     const [x, y] = [w - 42, h - 40];
     this.pen.textAlign = 'center';

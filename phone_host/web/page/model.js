@@ -1,8 +1,10 @@
 // A scan's surface: triangles with colours, lit from the viewer so that its shape shows. Colours, shape alone, or how exactly it is known.
 
 import { RAMP } from './ramp.js';
-import * as three from './vendor/three.js';
+import './vendor/three.js';
 import { opaque, Viewer } from './viewer.js';
+
+const { three } = globalThis;
 
 /**
  * @typedef {object} Surface

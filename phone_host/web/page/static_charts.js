@@ -1,4 +1,4 @@
-// The script of static pages with charts. Prebuilt, with its styles: phone_host/report/page_charts.js. It takes all values from attributes
+// The script of static pages with charts. Prebuilt, with its styles, without uPlot, which stands before it: phone_host/report/page_charts.js. It takes all values from attributes
 // (report/chart_view.py writes them) and loads nothing.
 
 import { Chart } from './chart.js';

@@ -1,5 +1,5 @@
-// The script of static pages with depth: a pointer reads metres, the cloud turns by the same viewer as on the live page. Prebuilt:
-// phone_host/report/page_depth.js. It takes all values from attributes (report/depth_view.py and model_view.py write them) and loads nothing.
+// The script of static pages with depth: a pointer reads metres, the cloud turns by the same viewer as on the live page. Prebuilt,
+// without three.js, which stands before it: phone_host/report/page_depth.js. It takes all values from attributes (report/depth_view.py and model_view.py write them) and loads nothing.
 
 import { Cloud } from './cloud.js';
 import { connectCopying } from './copying.js';

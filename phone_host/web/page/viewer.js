@@ -5,7 +5,9 @@
 
 import { fitted, lengthOf } from './depth.js';
 import { CloudLegend } from './legend.js';
-import * as three from './vendor/three.js';
+import './vendor/three.js';
+
+const { three } = globalThis;
 
 /** @typedef {'turned' | 'front' | 'side' | 'above'} ViewName */
 
