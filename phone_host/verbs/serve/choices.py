@@ -12,8 +12,8 @@ from common.program.commandline import ExamplesFirstParser
 from common.program.request import add_options, read_request
 from phone_host.camera.browser_uri import is_browser
 from phone_host.jobs.run_request import RunRequest
+from phone_host.jobs.scan_request import ScanRequest
 from phone_host.verbs.calibrate import arguments as calibrate_arguments
-from phone_host.verbs.scan import arguments as scan_arguments
 
 _YES: Final = frozenset({"yes", "true", "on", "1"})
 _NO: Final = frozenset({"", "no", "false", "off", "0"})
@@ -59,7 +59,7 @@ def _declared() -> dict[str, argparse.Action]:
 @cache
 def _declared_by_scan() -> dict[str, argparse.Action]:
     """Return the options of `scan`."""
-    return _parser(scan_arguments.add_arguments).declared
+    return _parser(lambda made: add_options(made, ScanRequest)).declared
 
 
 def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict[str, str]:

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -12,23 +11,19 @@ from common.places import make_folder
 from common.program.request import read_request, usual_values
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.run_snapshot import RunSnapshot
-from phone_host.jobs.output_folders import writing
-from phone_host.jobs.run import PreparedRun, open_run
 from phone_host.jobs.run_request import RunRequest, checked
+from phone_host.jobs.scan import PreparedScan, prepare_scan
+from phone_host.jobs.scan_request import ModelOptions, axes_beside, box_of, model_wanted
 from phone_host.live.scan import LiveScan
 from phone_host.model.unseen import UnseenSurface
-from phone_host.output.axes import Axes
 from phone_host.report.report_page import Headline
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict
 from phone_host.report.stereo_report import ALWAYS
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
-from phone_host.run.scan_files import FinishedScan, write_scan
 from phone_host.scan.box import Box
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.serve.program import Choices, Scanned, SinksOf
-from phone_host.verbs.scan.live import live_scan
-from phone_host.verbs.scan.wanted import ModelOptions, axes_beside, box_of, model_wanted
 
 OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object", "unseen")
 """Options of `scan` that the page may give."""
@@ -39,51 +34,39 @@ class PageScan:
     """A scan that is ready to begin.
 
     Attributes:
-        prepared: the run beneath.
-        live: takes its pairs.
-        out: folder for its files.
-        matcher: its name.
-        axes: of its files.
+        scan: with the run beneath.
     """
 
-    prepared: PreparedRun
-    live: LiveScan
-    out: Path
-    matcher: str
-    axes: Axes
+    scan: PreparedScan
 
     @property
     def host(self) -> Host:
         """See ReadyScan."""
-        return self.prepared.host
+        return self.scan.host
+
+    @property
+    def live(self) -> LiveScan:
+        """See ReadyScan."""
+        return self.scan.live
 
     def finish(self, ended: EndReason) -> Scanned:
         """See ReadyScan."""
-        over = self.prepared.ended(ended)
-        finished = self._finished()
-        with writing(self.out):
-            self.live.work.write(finished)
-        verdict, words = _verdict(finished.report)
-        return self._scanned(words, verdict, over.snapshot)
+        report, snapshot = self.scan.ended(ended)
+        verdict, words = _verdict(report)
+        return self._scanned(words, verdict, snapshot)
 
     def save(self) -> Scanned | None:
         """See ReadyScan."""
-        if not self.live.scan.fused:
+        report = self.scan.failed()
+        if report is None:
             return None
-        with suppress(Exception):  # tell what ended the scan, not what followed
-            finished = self._finished()
-            write_scan(self.out, finished)
-            verdict, words = _verdict(finished.report)
-            at_best = Headline.WARNING if verdict is Headline.GOOD else verdict
-            return self._scanned(f"ended early: {words}", at_best, self.host.snapshot())
-        return None
+        verdict, words = _verdict(report)
+        at_best = Headline.WARNING if verdict is Headline.GOOD else verdict
+        return self._scanned(f"ended early: {words}", at_best, self.host.snapshot())
 
     def _scanned(self, words: str, verdict: Headline, snapshot: RunSnapshot) -> Scanned:
         files = (MODEL, TRAJECTORY, *ALWAYS)
-        return Scanned(words=words, level=verdict.value, folder=self.out, files=files, snapshot=snapshot)
-
-    def _finished(self) -> FinishedScan:
-        return self.live.finished(self.host.snapshot(), self.matcher, self.axes)
+        return Scanned(words=words, level=verdict.value, folder=self.scan.out, files=files, snapshot=snapshot)
 
 
 def page_scan(
@@ -120,11 +103,9 @@ def page_scan(
             f"{min(unknown)!r} is no option of a scan that the page can set", f"give some of {', '.join(OF_SCAN)}"
         )
     wanted = asked_scan(values)
+    axes = axes_beside(request.depth.axes, wanted)
     out = _new_folder(folder)
-    opened = open_run(request, found, tell, feed)
-    live = live_scan(opened, wanted, out)
-    prepared = opened.prepared((), (live.sink, *sinks_of(opened.core)))
-    return PageScan(prepared, live, out, found.values.matcher, axes_beside(request.depth.axes, wanted))
+    return PageScan(prepare_scan(request, found, wanted, axes, out, tell=tell, feed=feed, sinks_of=sinks_of))
 
 
 def asked_scan(values: Choices) -> ScanWanted:

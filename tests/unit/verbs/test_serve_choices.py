@@ -1,6 +1,5 @@
 """What the page is set to: choices as a command line, what is kept of them, and its address."""
 
-import argparse
 import shlex
 from pathlib import Path
 
@@ -8,11 +7,11 @@ import pytest
 
 from common.errors import DataError, SettingsError
 from phone_host.output.axes import Axes
-from phone_host.verbs.scan.arguments import add_arguments
 from phone_host.verbs.serve.choices import choices_of, run_request, run_words, shown_words, with_changes, without_depth
 from phone_host.verbs.serve.kept_choices import keep, kept
 from phone_host.verbs.serve.page import address_of, page_settings
 from phone_host.verbs.serve.program import Commands
+from tests.support.requests import request_of
 
 
 def test_choices_are_a_command_line_and_back() -> None:
@@ -80,11 +79,10 @@ def test_the_command_of_a_scan_has_the_choices_that_scan_takes(tmp_path: Path) -
     line = commands.scan_command({**cameras, "calibration": "my rig.yaml", "near": "300", "fifo": "4", "out": "there"})
     words = shlex.split(line)
     assert (Path(words[0]).name, words[1]) == ("phone-host", "scan")
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    options = parser.parse_args(words[2:])
-    assert (options.link, options.camera, options.calibration, options.out, options.keys) == (
-        [cameras["link"]], cameras["camera"], "my rig.yaml", Path("there/scan"), str(tmp_path / "keys"),
+    request = request_of(*words[1:])
+    link, camera, keys = request.cameras.link, request.cameras.camera, request.cameras.keys
+    assert (link, camera, request.depth.calibration, request.out, keys) == (
+        (cameras["link"],), cameras["camera"], "my rig.yaml", Path("there/scan"), str(tmp_path / "keys"),
     )  # fmt: skip
     assert "--fifo" not in line
     assert commands.scan_command({"camera": cameras["camera"]}) == ""

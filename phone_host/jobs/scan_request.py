@@ -1,19 +1,20 @@
-"""How a model is to be made: the options about it, and what they ask for."""
+"""What a scan is asked for: its cameras or pictures, and how the model is made."""
 
-import argparse
 import math
 import re
-import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError, UnavailableError
-from common.program.quantities import decimal_number, file_size
-from common.program.request import option, read_request
-from common.program.terminal import say
+from common.program.quantities import decimal_number, file_size, seconds
+from common.program.request import Request, option, part
 from common.words import counted
+from phone_host.jobs.depth import LimitedDepthOptions
+from phone_host.jobs.options import PAIRED, ImageOptions, PairOptions
 from phone_host.jobs.units import length_mm
+from phone_host.model import Side
 from phone_host.model.unseen import UNSEEN_HELP, UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.run.kept_submaps import read_submaps, require_no_submaps
@@ -25,7 +26,6 @@ from phone_host.scan.mat import USUAL_MAT, Mat, parse_mat
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap
 from phone_host.stereo.match_tandem import matching_threads
-from phone_host.verbs.stereo_options import output_options
 
 _LEAST_VOXEL_MM, _MOST_VOXEL_MM = 0.2, 250.0
 _USUAL: Final = "usual"
@@ -146,9 +146,65 @@ class ModelOptions:
     )
 
 
-def scan_wanted(options: argparse.Namespace) -> ScanWanted:
-    """Read the options of `scan` as `model_wanted` does."""
-    return model_wanted(read_request(ModelOptions, vars(options)), options.out)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScanRequest(Request):
+    """What a scan can be told."""
+
+    images: tuple[str, ...] = option(
+        nargs="*",
+        metavar="LEFT RIGHT",
+        help=f"images in the order in which they were taken, each pair sharing most of what the last one shows; without them two cameras are"
+        f" scanned live: {PAIRED}",
+    )
+    config: Path | None = option("--config", type=Path, metavar="FILE", help="live: settings file (TOML)")
+    cameras: PairOptions = part(PairOptions, "live: ")
+    board_side: Side | None = option(
+        "--board-side",
+        read=lambda text, _: Side(text),
+        choices=("left", "right"),
+        help="live: which view the board's camera gives (default: as in the calibration, else left)",
+    )
+    replay: str | None = option(
+        "--replay",
+        metavar="FILE.mcap",
+        help="play a recording in place of --link and --camera: all of its pairs, the same each time; without --calibration the rig.yaml in it counts",
+    )
+    record: Path | None = option(
+        "--record",
+        type=Path,
+        metavar="FILE.mcap",
+        help="live: also keep what both cameras give, to scan it again with --replay: finer, or after a crash",
+    )
+    pairs: int | None = option("--pairs", type=int, metavar="N", help="live: end after N pairs (default 0: no limit)")
+    duration_s: float = option(
+        "--seconds",
+        number=seconds,
+        default=0.0,
+        metavar="S",
+        help="live: end S seconds after the first pair (default: with Ctrl-C or SIGTERM)",
+    )
+    depth: LimitedDepthOptions = part(LimitedDepthOptions)
+    pictures: ImageOptions = part(ImageOptions)
+    model: ModelOptions = part(ModelOptions)
+    resume: Path | None = option(
+        "--resume",
+        type=Path,
+        metavar="DIR",
+        help="go on with a scan that was killed, from the last submap that it has written into its folder, one every 20 pairs of the model;"
+        " DIR may be that of --out",
+    )
+    restart: bool = option(
+        "--restart",
+        action="store_true",
+        help="start again where --out holds what a scan that was killed has written; without it that is refused",
+    )
+    out: Path = option(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="folder for model.ply, trajectory.txt, report.json and index.html, not that of the images; it is created if it does not exist",
+    )
 
 
 def model_wanted(options: ModelOptions, out: Path | None) -> ScanWanted:
@@ -207,52 +263,48 @@ def _onto_of(options: ModelOptions, out: Path | None) -> KeptField | None:
         raise UnavailableError(f"--onto {options.onto}: {error.strerror}", "give a folder that can be read") from error
 
 
-def resumed_of(options: argparse.Namespace) -> tuple[Submap, ...]:
-    """Read the submaps that --resume names, and say what goes on.
+def resumed_of(request: ScanRequest, tell: Callable[[str], None]) -> tuple[Submap, ...]:
+    """Read the submaps that --resume names, and tell what goes on.
 
     Args:
-        options: options as `scan` declares them.
+        request: of the scan.
+        tell: takes a line that the user should know.
 
     Raises:
         DataError: there are none, or they are damaged.
         SettingsError: they were made with another --voxel; or others lie in --out and --restart is not given.
         UnavailableError: they cannot be read.
     """
-    if options.resume is None:
-        if not options.restart:
-            require_no_submaps(options.out)
+    if request.resume is None:
+        if not request.restart:
+            require_no_submaps(request.out)
         return ()
-    if options.restart:
+    if request.restart:
         raise SettingsError("--resume beside --restart", "leave one of them out")
-    if options.resume.resolve() != options.out.resolve():
-        require_no_submaps(options.out)
-    if options.turntable:
+    if request.resume.resolve() != request.out.resolve():
+        require_no_submaps(request.out)
+    if request.model.turntable:
         raise SettingsError(
             "--resume beside --turntable: the end needs all of its pairs", "scan the pictures or the recording again"
         )
     try:
-        submaps = read_submaps(options.resume)
+        submaps = read_submaps(request.resume)
     except OSError as error:
         raise UnavailableError(
-            f"--resume {options.resume}: {error.strerror}", "give a folder that can be read"
+            f"--resume {request.resume}: {error.strerror}", "give a folder that can be read"
         ) from error
     voxel_m = submaps[-1].settings.voxel_m
-    if options.voxel is not None and not math.isclose(voxel_of(options.voxel), voxel_m):
+    if request.model.voxel_m is not None and not math.isclose(request.model.voxel_m, voxel_m):
         raise SettingsError(
-            f"--voxel is {options.voxel}, the scan in {options.resume} has {voxel_m * 1000:g} mm", "leave --voxel out"
+            f"--voxel is {request.given['voxel']}, the scan in {request.resume} has {voxel_m * 1000:g} mm",
+            "leave --voxel out",
         )
     pairs = [pair for submap in submaps for pair in submap.pairs]
-    say(
-        f"phone-host: going on after pair {pairs[-1].name}, with {counted(len(pairs), 'pair')};"
-        " what was taken into the model after it is lost, and is taken again where it is given again",
-        sys.stderr,
+    tell(
+        f"going on after pair {pairs[-1].name}, with {counted(len(pairs), 'pair')};"
+        " what was taken into the model after it is lost, and is taken again where it is given again"
     )
     return submaps
-
-
-def axes_of(options: argparse.Namespace, wanted: ScanWanted) -> Axes:
-    """Return the axes of the files, as `axes_beside` does."""
-    return axes_beside(output_options(options).axes, wanted)
 
 
 def axes_beside(asked: Axes, wanted: ScanWanted) -> Axes:

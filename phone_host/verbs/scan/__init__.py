@@ -1,1 +1,0 @@
-"""phone-host scan: its options (light), and its command."""
