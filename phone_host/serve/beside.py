@@ -12,9 +12,9 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.output.axes import Axes
 from phone_host.run.host import Host
+from phone_host.serve.choices import Choices
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
-from phone_host.serve.program import Choices
 from phone_host.serve.recordings import Recordings
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest

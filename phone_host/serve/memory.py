@@ -9,7 +9,7 @@ from common import now
 from common.diagnostic import Diagnostic
 from phone_host.calibration.guide.snapshot import Ended
 from phone_host.diagnostics.run_snapshot import RunSnapshot
-from phone_host.serve.program import Calibrated, Choices
+from phone_host.serve.choices import Choices
 from phone_host.serve.steps import Facts, steps
 from phone_host.web.source import Activity, Choice, PageState, PrintState, ScanState
 
@@ -87,10 +87,9 @@ class Memory:
         """Take what the live calibration shows."""
         self._guide = content
 
-    def calibrated(self, done: Calibrated) -> None:
-        """Take what a calibration came to: its words stay with the guide."""
-        self._guide = {**(self._guide or {}), "result": done.words}
-        self._trouble = done.trouble
+    def calibrated(self, words: str, trouble: Diagnostic | None) -> None:
+        """Take what a calibration came to, and why there is no rig of use; its words stay with the guide."""
+        self._guide, self._trouble = {**(self._guide or {}), "result": words}, trouble
 
     def calibration_stopped(self, words: str) -> None:
         """Take in one sentence how far a live calibration came that was stopped: its verdict so far is not that of a rig."""

@@ -1,15 +1,14 @@
 """Recordings that are begun and ended on the page, beside whatever run goes on."""
 
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from common.errors import SettingsError, UnavailableError
-from common.places import make_folder
+from common.errors import SettingsError
 from common.recording.opened import SUFFIX
 from phone_host.run.host import Host
+from phone_host.serve.places import new_place
 from phone_host.web.source import Answer
 
 
@@ -52,13 +51,8 @@ class Recordings:
             raise SettingsError("no run is active", "start it first")
         if host.recording is None:
             raise SettingsError("this run plays a recording", "record while cameras are live")
-        try:
-            make_folder(folder)
-        except OSError as error:
-            cause = error.strerror or str(error)
-            raise UnavailableError(f"{folder} cannot be made ({cause})", "make room, or choose another out") from None
         with self._changing:
-            path = _free(folder)
+            path = new_place(folder, SUFFIX)
             host.recording.begin(path)
         return Answer(words=f"recording to {path}")
 
@@ -67,12 +61,3 @@ class Recordings:
         host = self._host
         account = None if host is None or host.recording is None else host.recording.end(host.cameras_text())
         return Answer(words="nothing is recorded" if account is None else account.words)
-
-
-def _free(folder: Path) -> Path:
-    """Return a name that is free: date and time of this place, with a number behind it if need be."""
-    stem = time.strftime("%Y-%m-%d-%H%M%S")
-    path, number = folder / f"{stem}{SUFFIX}", 2
-    while path.exists():
-        path, number = folder / f"{stem}-{number}{SUFFIX}", number + 1
-    return path

@@ -3,16 +3,20 @@
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
+from phone_host.jobs.scan_request import box_of
 from phone_host.live.scan import LiveScan
 from phone_host.output.axes import Axes
-from phone_host.scan.box import Box
+from phone_host.report.report_page import Headline
+from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict
+from phone_host.report.stereo_report import ALWAYS
 from phone_host.scan.patches import Patches
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import Tracking
-from phone_host.serve.program import Scanned
 from phone_host.web.source import ScanState, Surface
 
 _LEVELS: Final = {
@@ -32,6 +36,40 @@ _ON_THE_PAGE: Final = (
     (r"leave --turntable out", "choose another kind in \u201cWhat to scan\u201d"),
 )
 """What helps by an option of the command line, and by what the page has in its place."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scanned:
+    """What came of a scan.
+
+    Attributes:
+        words: one sentence.
+        level: good, warning or bad.
+        folder: where its files lie.
+        files: their names.
+    """
+
+    words: str
+    level: str
+    folder: Path
+    files: tuple[str, ...] = (MODEL, TRAJECTORY, *ALWAYS)
+
+
+def scanned(report: ScanReport, folder: Path, *, is_early: bool = False) -> Scanned:
+    """Return what came of a scan.
+
+    Args:
+        report: of it.
+        folder: where its files lie.
+        is_early: whether an error ended it.
+    """
+    verdict, words = scan_verdict(report)
+    if report.model.triangles:
+        wide, high, deep = (1000 * side for side in report.model.size.extent_m)
+        words += f" Size: {wide:.0f} x {high:.0f} x {deep:.0f} mm"
+    if is_early:
+        words, verdict = f"ended early: {words}", Headline.WARNING if verdict is Headline.GOOD else verdict
+    return Scanned(words=words, level=verdict.value, folder=folder)
 
 
 class Scanning:
@@ -66,16 +104,16 @@ class Scanning:
         """Take what came of it; None: nothing was written."""
         self._over = scanned
 
-    def crop(self, box: Box | None, text: str) -> str:
+    def crop(self, text: str) -> str:
         """Keep only what lies in a box; return what to say.
 
         Args:
-            box: None: everything.
-            text: the box as it was typed.
+            text: the box, as `scan` has it; empty: everything.
 
         Raises:
-            SettingsError: no scan is active.
+            SettingsError: it is no box, or no scan is active.
         """
+        box = box_of(text) if text.strip() else None
         if (live := self._live) is None:
             raise SettingsError("no scan is active", "start one: the box can also be set before it starts")
         live.crop(box)

@@ -2,7 +2,7 @@
 
 page ── Source ── Station ─┬ Activities: enrol | check | calibrate | run, in a thread
 ├ Shelf: the newest results, from the run's sink
-└ Program: what the commands do, handed over by `serve`
+└ Commands: what is chosen, and the jobs that are begun with it
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,16 +22,19 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.discovery.enrolment import PairingCall
 from phone_host.doctor.host_doctor import examine
+from phone_host.jobs.run import PreparedRun
 from phone_host.live.calibration_view import SnapshotValues
 from phone_host.run.freed_memory import give_back_freed_memory
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task
 from phone_host.serve.capture_guide import CaptureGuide
+from phone_host.serve.choices import Choices
+from phone_host.serve.commands import Calibrate, Commands
 from phone_host.serve.memory import Memory
+from phone_host.serve.places import page_folder
 from phone_host.serve.point_answer import answered
-from phone_host.serve.program import Choices, Program, ReadyRun
 from phone_host.serve.recordings import Recordings
-from phone_host.serve.scanning import Scanning
+from phone_host.serve.scanning import Scanning, scanned
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.workshop import Workshop
@@ -65,13 +68,14 @@ class Station:
     """The source behind the page of `serve`.
 
     Args:
-        program: what the commands do.
+        commands: what is chosen, and the jobs that are begun with it.
+        calibrate: opens a live calibration.
     """
 
-    def __init__(self, program: Program) -> None:
-        self._program = program
+    def __init__(self, commands: Commands, calibrate: Calibrate) -> None:
+        self._commands, self._opened_calibration = commands, calibrate
         self._shelf = Shelf()
-        kept = program.kept()
+        kept = commands.kept
         self._memory = Memory(kept)
         self._choosing = Lock()
         self._recordings, self._scanning = Recordings(), Scanning()
@@ -86,40 +90,40 @@ class Station:
             Do.CALIBRATE: self._calibrate,
             Do.RUN: self._run,
             Do.SCAN: self._scan,
-            Do.CROP: lambda values: Answer(words=self._scanning.crop(self._program.box(values), values.get("box", ""))),
+            Do.CROP: lambda values: Answer(words=self._scanning.crop(values.get("box", ""))),
             Do.STOP: self._stop,
             Do.SNAPSHOT: self._snapshot,
             Do.RECORD: self._record,
             Do.END_RECORDING: self._end_recording,
-            Do.CHECK_MODEL: lambda values: self._made(self._workshop.check, self._program.print_wanted(values)),
+            Do.CHECK_MODEL: lambda values: self._made(self._workshop.check, self._commands.print_wanted(values)),
             Do.SAVE_MODEL: lambda values: self._made(self._workshop.save, values.get("format", "")),
-            Do.PREPARE_PRINT: lambda values: self._made(self._workshop.prepare, self._program.print_wanted(values)),
+            Do.PREPARE_PRINT: lambda values: self._made(self._workshop.prepare, self._commands.print_wanted(values)),
             Do.PRINT: lambda values: Answer(words=self._workshop.start(values.get("confirm", ""))),
             Do.PAUSE_PRINT: lambda _: Answer(words=self._workshop.pause()),
             Do.CANCEL_PRINT: lambda _: Answer(words=self._workshop.cancel()),
         }
         try:
-            program.changed(kept, kept)
+            commands.changed(kept, kept)
         except TandemError as error:  # somebody else has changed the file, or what it names has gone
             self._memory.fail(diagnostic_of(error))
 
     @property
     def feed(self) -> BrowserFeed:
         """See Source."""
-        return self._program.feed
+        return self._commands.feed
 
     def state(self) -> PageState:
         """See Source."""
         choices = self._memory.choices
         return self._memory.state(
             self._activities.now,
-            self._program.shown(choices),
-            self._program.command(choices) if choices.get("camera") else "",
-            matchers=self._program.matchers,
+            self._commands.shown(choices),
+            self._commands.command(choices) if choices.get("camera") else "",
+            matchers=self._commands.matchers,
             stranger=self._stranger(choices.get("link", "")),
             browser=find.browser_choice(self.feed.words),
             scan=self._scanned_state(),
-            scan_command=self._program.scan_command(choices),
+            scan_command=self._commands.scan_command(choices),
             printing=self._workshop.state,
         )
 
@@ -161,7 +165,7 @@ class Station:
 
     def saved(self) -> str:
         """See Source."""
-        folder, _ = self._program.snapshots(self._memory.choices)
+        folder, _ = self._commands.snapshots(self._memory.choices)
         return str(folder) if folder.is_dir() else ""
 
     def close(self) -> None:
@@ -189,13 +193,13 @@ class Station:
 
     def _stranger(self, links: str) -> str:
         try:
-            return find.stranger(links, self._program.keys.peers())
+            return find.stranger(links, self._commands.keys.peers())
         except TandemError:  # a run with these settings says what is wrong
             return ""
 
     def _find(self, values: Choices) -> Answer:
         del values
-        boards, cameras = find.find_boards(self._program.keys), find.find_cameras()
+        boards, cameras = find.find_boards(self._commands.keys), find.find_cameras()
         self._memory.found(boards, cameras)
         taken = [
             name
@@ -215,7 +219,7 @@ class Station:
             raise SettingsError(f"link {link!r} needs no code", "choose it, and check")
 
         def work(task: Task) -> None:
-            call = PairingCall(pairing_address(uri.address), self._program.keys, uri.address, patience_s=_DOOR_S)
+            call = PairingCall(pairing_address(uri.address), self._commands.keys, uri.address, patience_s=_DOOR_S)
             call.ask()
             if task.stopped():
                 return
@@ -239,8 +243,8 @@ class Station:
             SettingsError: they are not valid, or cannot be kept.
         """
         with self._choosing:  # two pages may set something at the same moment
-            new = self._program.changed(self._memory.choices, changes)
-            self._program.keep(new)
+            new = self._commands.changed(self._memory.choices, changes)
+            self._commands.keep(new)
             self._memory.choose(new)
 
     def _check(self, values: Choices) -> Answer:
@@ -249,7 +253,7 @@ class Station:
 
         def work(task: Task) -> None:
             findings = []
-            for finding in examine(self._program.question(choices)):
+            for finding in examine(self._commands.question(choices)):
                 if task.stopped():
                     return
                 findings.append(finding)
@@ -257,7 +261,7 @@ class Station:
             if (trouble := check.obstacle(findings)) is not None:
                 self._memory.fail(trouble)
                 return
-            over = self._watched(task, self._program.trial(choices, self._sinks))
+            over = self._watched(task, self._commands.trial(choices, self._sinks))
             self._memory.forget_run()
             if task.stopped():
                 return
@@ -279,7 +283,7 @@ class Station:
             guide.wait()
             try:
                 with task.held():
-                    findings = self._program.capture(choices, task.stopped, guide.tell)
+                    findings = self._commands.capture(choices, task.stopped, guide.tell)
                 found = [] if task.stopped() else check.checked(findings)
             finally:
                 self._show_checks(found)  # whatever ended it: nobody is to hold the camera any more
@@ -294,7 +298,8 @@ class Station:
         choices = self._both_chosen()
 
         def work(task: Task) -> None:
-            ready = self._program.calibration(choices, values, self._sinks(None))
+            words = self._commands.calibration_words(choices, values)
+            ready = self._opened_calibration(words, self.feed, self._sinks(None))
             shown = SnapshotValues(self._show_guide)
             try:
                 with task.held(), self._memory.live(ready.live.host.snapshot):
@@ -308,7 +313,7 @@ class Station:
             done = ready.finish(task.go_on)
             if done.rig is not None:
                 self._choose({"calibration": str(done.rig), "rectified": ""})
-            self._memory.calibrated(done)
+            self._memory.calibrated(done.words, done.trouble)
 
         return self._begun(Activity.CALIBRATING, work, "the calibration begins: show the board to both cameras")
 
@@ -321,7 +326,7 @@ class Station:
         choices = self._both_chosen()
 
         def work(task: Task) -> None:
-            over = self._watched(task, self._program.run(choices, self._sinks))
+            over = self._watched(task, self._commands.run(choices, self._sinks))
             if not task.is_left:
                 self._memory.ran(over.processed)
 
@@ -331,25 +336,26 @@ class Station:
         choices = self._both_chosen()
 
         def work(task: Task) -> None:
-            ready = self._program.scan(choices, values, self._sinks)
-            host = ready.host
+            scan = self._commands.scan(choices, values, self._sinks)
+            host = scan.host
             with (
                 task.held(),
                 self._memory.live(host.snapshot),
-                self._scanning.shown(ready.live, self._memory.begun, values),
+                self._scanning.shown(scan.live, self._memory.begun, values),
             ):
                 try:
-                    done = ready.finish(host.run(task.stopped))
+                    report, snapshot = scan.ended(host.run(task.stopped))
                 except Exception:
-                    self._scanning.over(ready.save())
+                    early = scan.failed()
+                    self._scanning.over(None if early is None else scanned(early, scan.out, is_early=True))
                     raise
-            self._memory.last(done.snapshot)
+            self._memory.last(snapshot)
             self._memory.gave_up(host.has_given_up)
-            self._scanning.over(done)
+            self._scanning.over(scanned(report, scan.out))
 
         return self._begun(Activity.SCANNING, work, "the scan begins")
 
-    def _watched(self, task: Task, ready: ReadyRun) -> RunSnapshot:
+    def _watched(self, task: Task, ready: PreparedRun) -> RunSnapshot:
         """Run, show it, and write its report; return its last snapshot."""
         with task.held(), self._memory.live(ready.host.snapshot), self._recordings.beside(ready.host):
             try:
@@ -374,11 +380,11 @@ class Station:
 
     def _snapshot(self, values: Choices) -> Answer:
         del values
-        return keep_newest(self._shelf, *self._program.snapshots(self._memory.choices))
+        return keep_newest(self._shelf, *self._commands.snapshots(self._memory.choices))
 
     def _record(self, values: Choices) -> Answer:
         del values
-        return self._recordings.begin(self._program.recordings(self._memory.choices))
+        return self._recordings.begin(page_folder(self._memory.choices.get("out"), "recordings"))
 
     def _end_recording(self, values: Choices) -> Answer:
         del values

@@ -7,21 +7,28 @@ only an answer that names both starts it.
 import math
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Final
 
 from common.errors import SettingsError, TandemError, UnavailableError
 from common.words import counted
+from phone_host.output.data_folder import data_folder
 from phone_host.output.meshes.formats import FORMATS
 from phone_host.output.meshes.printable import Printer
-from phone_host.printers.door import Job
-from phone_host.printers.preparing import job_of
-from phone_host.printers.printer_uri import FileUri
+from phone_host.printers.bed import parse_bed
+from phone_host.printers.door import Job, PrinterDoor
+from phone_host.printers.doors import configured_door
+from phone_host.printers.journal import Journal
+from phone_host.printers.preparing import Wanted, job_of
+from phone_host.printers.printer_uri import FileUri, PrinterUri, read_uri
 from phone_host.printers.printing import Place, RunningPrint
 from phone_host.printers.progress import Ended, Phase, Progress
+from phone_host.printers.slicing import SlicingWanted
 from phone_host.run.model_job import check_model, export_model
-from phone_host.serve.program import PrintWanted
+from phone_host.serve.choices import Choices
+from phone_host.settings import printer_keys
 from phone_host.web.source import PrintStage, PrintState
 
 _GIVEN_UP_S: Final = 2.0
@@ -33,6 +40,44 @@ _END_S: Final = 20.0
 
 class _GivenUpError(Exception):
     """Raised inside what prepares a print that nobody wants any more. Nobody's fault."""
+
+
+@dataclass(frozen=True, slots=True)
+class PrintWanted:
+    """Where and how a scan is printed.
+
+    Attributes:
+        text: the printer's address, as the user wrote it; empty: none.
+        uri: the same; None: none.
+        door: to it; None likewise.
+        how: the bed, and how the model is sliced.
+        journal: keeps how far it is.
+    """
+
+    text: str
+    uri: PrinterUri | None
+    door: PrinterDoor | None
+    how: Wanted
+    journal: Journal
+
+
+def asked_print(values: Choices, file: Path | None) -> PrintWanted:
+    """Return how the page wants a scan printed. Nothing is opened.
+
+    Args:
+        values: `printer`, which may be missing, and `bed`.
+        file: settings file with the keys of servers; None: there is none.
+
+    Raises:
+        SettingsError: they make no sense.
+    """
+    text = values.get("printer", "").strip()
+    bed = parse_bed(words) if (words := values.get("bed", "").strip()) else None
+    how, journal = Wanted(SlicingWanted(bed)), Journal(data_folder() / "printing")
+    if not text:
+        return PrintWanted("", None, None, how, journal)
+    uri = read_uri(text)
+    return PrintWanted(uri.text, uri, configured_door(uri, *printer_keys(file)), how, journal)
 
 
 class Workshop:

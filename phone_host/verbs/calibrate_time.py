@@ -45,10 +45,10 @@ from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.output.rig_yaml import write_time_offset
 from phone_host.recording.footage import Footage, film, keep, read, read_recording
 from phone_host.run.progress_bar import share_bar
+from phone_host.serve.page import camera_page
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
 from phone_host.stereo.rectifier import Rectifier
-from phone_host.verbs.page_beside import camera_page
 
 EXAMPLES = """  phone-host calibrate-time --pattern pattern.html    # open it full screen in a browser, in view of both cameras
   phone-host calibrate-time --by screen --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --calibration rig.yaml --out timing

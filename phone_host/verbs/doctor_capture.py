@@ -11,7 +11,7 @@ from phone_host.doctor.camera_check.words import stage_words
 from phone_host.doctor.capture import CheckedCapture, check_capture
 from phone_host.doctor.host_doctor import Question
 from phone_host.run.progress_bar import ShareBar, share_bar
-from phone_host.verbs.page_beside import camera_page
+from phone_host.serve.page import camera_page
 
 
 def guided_capture(question: Question, whole_s: float) -> CheckedCapture:

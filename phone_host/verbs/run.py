@@ -78,7 +78,7 @@ def _page(request: RunRequest, found: Resolved[PhoneHostSettings]) -> "AbstractC
         if request.lan:
             raise SettingsError("--lan without --serve", "add --serve, or leave it out")
         return nullcontext()
-    from phone_host.verbs.page_beside import page_beside  # noqa: PLC0415 - a server that most runs do without
+    from phone_host.serve.page import page_beside  # noqa: PLC0415 - a server that most runs do without
 
     return page_beside(request, found)
 

@@ -11,8 +11,7 @@ import pytest
 from common.errors import SettingsError
 from phone_host.output.model_file import read_model
 from phone_host.output.ply import PointCloud, write_surface
-from phone_host.serve.workshop import Workshop
-from phone_host.verbs.serve.program import asked_print
+from phone_host.serve.workshop import Workshop, asked_print
 from phone_host.web.source import PrintStage, PrintState
 from tests.support.marlin_printer import printer
 from tests.support.programs import until

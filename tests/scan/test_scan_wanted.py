@@ -16,7 +16,7 @@ from phone_host.scan.pose_source import TablePoses, VisualPoses
 from phone_host.scan.turntable import TurntablePoses
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.verbs.serve.page_scan import asked_scan
+from phone_host.serve.choices import asked_scan
 from tests.support.requests import verbs_of
 
 

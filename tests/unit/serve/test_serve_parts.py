@@ -21,7 +21,6 @@ from phone_host.live.scan import LiveScan
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side
 from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes
-from phone_host.scan.box import Box
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracking_words import Weakness
 from phone_host.serve import check
@@ -29,12 +28,11 @@ from phone_host.serve.activities import Activities, Task
 from phone_host.serve.find import board_choice, stranger
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
-from phone_host.serve.program import Scanned
-from phone_host.serve.scanning import Scanning, page_words
+from phone_host.serve.scanning import Scanned, Scanning, page_words
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.snapshots import keep_newest
 from phone_host.serve.steps import Facts, steps
-from phone_host.verbs.serve.status import Status, told
+from phone_host.verbs.serve import Status, told
 from phone_host.web.source import Activity, PageState, ScanState, StepName, Surface
 from tests.support.run_snapshots import run
 from tests.support.samples import LEDGER
@@ -357,13 +355,13 @@ def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
     live = LiveScan(ScanWanted(), Side.LEFT, tmp_path, waits=False, is_timeless=False)
     with scanning.shown(live, 7, {"voxel": "2mm", "box": ""}):
         assert state() == ScanState(words="waiting for the first pair", options={"voxel": "2mm", "box": ""})
-        scanning.crop(Box((0, 0, 0), (1, 1, 1)), "1000x1000x1000@500,500,500")
+        scanning.crop("1000x1000x1000@500,500,500")
         assert scanning.surface(0, 10) == Surface(7, ())
         assert told(PageState(activity=Activity.SCANNING, scan=state())) == "scanning: waiting for the first pair"
     ended = state()
     assert ended is not None
     assert "ended without a result" in ended.words
-    over = Scanned(words="3 pairs", level="good", folder=tmp_path, files=("model.ply",), snapshot=run(0))
+    over = Scanned(words="3 pairs", level="good", folder=tmp_path, files=("model.ply",))
     scanning.over(over)
     options = {"voxel": "2mm", "box": "1000x1000x1000@500,500,500"}
     assert state() == ScanState(

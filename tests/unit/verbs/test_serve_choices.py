@@ -6,30 +6,31 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError, SettingsError
+from phone_host.jobs.run_request import RunRequest
 from phone_host.output.axes import Axes
-from phone_host.verbs.serve.choices import choices_of, run_request, run_words, shown_words, with_changes, without_depth
-from phone_host.verbs.serve.kept_choices import keep, kept
-from phone_host.verbs.serve.page import address_of, page_settings
-from phone_host.verbs.serve.program import Commands
-from tests.support.requests import request_of
+from phone_host.serve.choices import choices_of, request_of, shown_words, with_changes, without_depth, words_of
+from phone_host.serve.commands import Commands
+from phone_host.serve.kept_choices import keep, kept
+from phone_host.serve.page import address_of, page_settings
+from tests.support import requests
 
 
 def test_choices_are_a_command_line_and_back() -> None:
     """Values, switches and several links become words, which the command's own parser reads; and its options become choices."""
     made = with_changes({"far": "5m"}, {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "far": "", "near": " 300 "})
     assert made == {"link": "tcp://a:1 tcp://b:2", "rectified": "yes", "near": "300"}
-    assert run_words(made) == ["--link", "tcp://a:1", "--link", "tcp://b:2", "--rectified", "--near", "300"]
-    request = run_request(run_words(made))
+    assert words_of(made) == ["--link", "tcp://a:1", "--link", "tcp://b:2", "--rectified", "--near", "300"]
+    request = request_of(made, RunRequest)
     assert (request.cameras.link, request.depth.rectified, request.depth.near_m) == (
         ("tcp://a:1", "tcp://b:2"),
         True,
         0.3,
     )
     assert choices_of(request.given) == made
-    assert shown_words(made) == run_words(made)
+    assert shown_words(made) == words_of(made)
     assert shown_words({"camera": "browser:"}) == ["--camera", "browser:", "--serve"]
     assert with_changes(made, {"rectified": "no"}) == {"link": "tcp://a:1 tcp://b:2", "near": "300"}
-    assert run_words({"crop": "-1,0,2,2"}) == ["--crop=-1,0,2,2"]
+    assert words_of({"crop": "-1,0,2,2"}) == ["--crop=-1,0,2,2"]
     assert without_depth(made) == {"link": "tcp://a:1 tcp://b:2"}
     home = str(Path.home())
     assert with_changes({}, {"calibration": "~/r.yaml", "out": " scan "}) == {
@@ -50,12 +51,12 @@ def test_what_is_no_option_of_a_run_cannot_be_set(changes: dict[str, str]) -> No
 def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
     """Settings become keys that `run --config` reads, other options a table of the page; keys of the program are not the page's."""
     file = tmp_path / "new" / "host.toml"
-    assert kept(file) == ({}, [])
+    assert kept(file) == ({}, {})
     choices = {"link": "tcp://a:1", "tolerance": "5ms", "interpolate": "yes", "near": "300"}
     keep(file, choices)
     assert file.stat().st_mode & 0o777 == 0o600
     file.write_text('keys = "k"  # mine\n' + file.read_text())
-    assert kept(file) == ({**choices, "tolerance": "5.0"}, ["--keys", "k"])
+    assert kept(file) == ({**choices, "tolerance": "5.0"}, {"keys": "k"})
     keep(file, {"near": "200"})
     assert file.read_text() == 'keys = "k"  # mine\n\n[page]\nnear = "200"\n'
     keep(file, {"near": "200"})
@@ -69,7 +70,7 @@ def test_a_choice_is_kept_beside_one_that_another_hand_spoiled(tmp_path: Path) -
     file = tmp_path / "host.toml"
     file.write_text('[page]\nnear = "1"\n')
     keep(file, {"camera": "replay:y"}, {"camera": "replay:x"})
-    assert kept(file) == ({"camera": "replay:y", "near": "1"}, [])
+    assert kept(file) == ({"camera": "replay:y", "near": "1"}, {})
 
 
 def test_the_command_of_a_scan_has_the_choices_that_scan_takes(tmp_path: Path) -> None:
@@ -79,7 +80,7 @@ def test_the_command_of_a_scan_has_the_choices_that_scan_takes(tmp_path: Path) -
     line = commands.scan_command({**cameras, "calibration": "my rig.yaml", "near": "300", "fifo": "4", "out": "there"})
     words = shlex.split(line)
     assert (Path(words[0]).name, words[1]) == ("phone-host", "scan")
-    request = request_of(*words[1:])
+    request = requests.request_of(*words[1:])
     link, camera, keys = request.cameras.link, request.cameras.camera, request.cameras.keys
     assert (link, camera, request.depth.calibration, request.out, keys) == (
         (cameras["link"],), cameras["camera"], "my rig.yaml", Path("there/scan"), str(tmp_path / "keys"),

@@ -1,7 +1,6 @@
 """The page's choices in the settings file: settings as its keys, other options of `run` in the table [page]."""
 
 import fcntl
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
@@ -12,8 +11,8 @@ from common.files import opened_folder, replacing_in
 from common.program.settings import read_file
 from common.program.settings_file import Value, changed
 from phone_host.declared_settings import PhoneHostSettings
+from phone_host.serve.choices import Choices, given_by, with_changes
 from phone_host.settings import PAGE_TABLE
-from phone_host.verbs.serve.choices import run_given, run_words, with_changes
 
 _NAMES: Final = {item.name.replace("_", "-"): item.name for item in fields(PhoneHostSettings)}
 _OF_PROGRAM: Final = ("keys", "log-level")
@@ -32,20 +31,20 @@ def is_there(file: Path) -> bool:
         raise SettingsError(f"{file} cannot be read ({error.strerror})", "name another file with --config") from None
 
 
-def kept(file: Path) -> tuple[dict[str, str], list[str]]:
+def kept(file: Path) -> tuple[dict[str, str], dict[str, str]]:
     """Read the choices.
 
     Args:
         file: the settings file; it may be missing.
 
     Returns:
-        The choices by option, and the words of the settings that are not the page's.
+        The choices by option, and the settings that are not the page's likewise.
 
     Raises:
         SettingsError: it cannot be read, is not TOML, or its table [page] names what is no option.
     """
     if not is_there(file):
-        return {}, []
+        return {}, {}
     content = read_file(file)
     found = {name: _as_words(content[key]) for name, key in _NAMES.items() if key in content}
     table = content.get(PAGE_TABLE, {})
@@ -55,11 +54,11 @@ def kept(file: Path) -> tuple[dict[str, str], list[str]]:
             found |= with_changes({}, chosen)
         except SettingsError as error:
             raise SettingsError(f"settings file {file}: {error.problem}", f"mend its table [{PAGE_TABLE}]") from None
-    others = [word for name in _OF_PROGRAM if found.get(name) for word in (f"--{name}", found[name])]
+    others = {name: found[name] for name in _OF_PROGRAM if found.get(name)}
     return {name: value for name, value in found.items() if value and name not in _OF_PROGRAM}, others
 
 
-def keep(file: Path, choices: Mapping[str, str], before: Mapping[str, str] | None = None) -> None:
+def keep(file: Path, choices: Choices, before: Choices | None = None) -> None:
     """Write the choices, whole or not at all. What else the file says stays, with its comments.
 
     The file is read again under a lock on its folder, and only what differs from `before` is changed in it, so that two pages
@@ -92,7 +91,7 @@ def keep(file: Path, choices: Mapping[str, str], before: Mapping[str, str] | Non
         ) from None
 
 
-def _merged(current: Mapping[str, str], before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, str]:
+def _merged(current: Choices, before: Choices, after: Choices) -> dict[str, str]:
     """Return what a file says now, changed where two states of one page differ."""
     names = {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
     return {name: value for name, value in current.items() if name not in names} | {
@@ -100,9 +99,9 @@ def _merged(current: Mapping[str, str], before: Mapping[str, str], after: Mappin
     }
 
 
-def _with_choices(text: str, choices: Mapping[str, str]) -> str:
+def _with_choices(text: str, choices: Choices) -> str:
     """Return the text of a settings file with these choices in place of its own."""
-    options = run_given(run_words(choices))
+    options = given_by(choices)
     keys: dict[str, Value | None] = {}
     for name, key in _NAMES.items():
         if name not in _OF_PROGRAM:

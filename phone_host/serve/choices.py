@@ -2,18 +2,23 @@
 
 import argparse
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Final, NoReturn, TypeVar
 
 from common.errors import SettingsError
 from common.program.commandline import ExamplesFirstParser
 from common.program.request import add_options, read_request
 from phone_host.camera.browser_uri import is_browser
 from phone_host.jobs.run_request import RunRequest
-from phone_host.jobs.scan_request import ScanRequest
-from phone_host.verbs.calibrate import arguments as calibrate_arguments
+from phone_host.jobs.scan_request import ModelOptions, model_wanted
+from phone_host.scan.scan_wanted import ScanWanted
+
+Choices = Mapping[str, str]
+"""Options by name without dashes."""
+
+T = TypeVar("T")
 
 _YES: Final = frozenset({"yes", "true", "on", "1"})
 _NO: Final = frozenset({"", "no", "false", "off", "0"})
@@ -29,9 +34,17 @@ _PLACES: Final = frozenset({"calibration", "out"})
 _SHORT: Final = frozenset({"link", "camera", "board-side", "tolerance", "fifo", "max-megapixels"})
 """What a run without depth needs."""
 
+_OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object", "unseen")
+"""Options of `scan` that the page may give."""
 
-class _Strict(ExamplesFirstParser):
+
+class StrictParser(ExamplesFirstParser):
     """A parser that raises what it would print."""
+
+    def __init__(self) -> None:
+        super().__init__("phone-host", add_help=False)
+        self.add_argument("--json", action="store_true")
+        self.add_argument("--debug", action="store_true")
 
     def error(self, message: str) -> NoReturn:
         """See ExamplesFirstParser."""
@@ -40,39 +53,25 @@ class _Strict(ExamplesFirstParser):
         )
 
 
-def _parser(
-    add_arguments: Callable[[argparse.ArgumentParser], None] = lambda made: add_options(made, RunRequest),
-) -> _Strict:
-    made = _Strict("phone-host", add_help=False)
-    add_arguments(made)
-    made.add_argument("--json", action="store_true")
-    made.add_argument("--debug", action="store_true")
+def _parser(kind: type) -> StrictParser:
+    made = StrictParser()
+    add_options(made, kind)
     return made
 
 
 @cache
-def _declared() -> dict[str, argparse.Action]:
-    """Return the options of `run`: the state asks for them several times a second."""
-    return _parser().declared
+def _declared(kind: type) -> dict[str, argparse.Action]:
+    """Return the options of a request: the page's state asks for them several times a second."""
+    return _parser(kind).declared
 
 
-@cache
-def _declared_by_scan() -> dict[str, argparse.Action]:
-    """Return the options of `scan`."""
-    return _parser(lambda made: add_options(made, ScanRequest)).declared
-
-
-def with_changes(choices: Mapping[str, str], changes: Mapping[str, str]) -> dict[str, str]:
+def with_changes(choices: Choices, changes: Choices) -> dict[str, str]:
     """Return choices with some changed; an empty value takes one back.
-
-    Args:
-        choices: by the option's name.
-        changes: likewise.
 
     Raises:
         SettingsError: there is no such option, or it is a switch and the value neither yes nor no.
     """
-    declared = _declared()
+    declared = _declared(RunRequest)
     made = dict(choices)
     for name, value in changes.items():
         if name not in declared or name in _NOT_CHOSEN:
@@ -98,22 +97,13 @@ def placed(path: str) -> str:
     return str(Path(os.path.expanduser(typed)).absolute()) if typed else ""  # noqa: PTH111 - Path's own raises without a home
 
 
-def run_words(choices: Mapping[str, str]) -> list[str]:
-    """Return choices as the words of a command line, after `run`."""
-    return _words(choices, _declared())
-
-
-def scan_words(choices: Mapping[str, str]) -> list[str]:
-    """Return those choices that `scan` takes, too, as the words of a command line, after `scan`."""
-    declared = _declared_by_scan()
-    return _words({name: value for name, value in choices.items() if name in declared}, declared)
-
-
-def _words(choices: Mapping[str, str], declared: Mapping[str, argparse.Action]) -> list[str]:
-    words: list[str] = []
+def words_of(choices: Choices, kind: type = RunRequest) -> list[str]:
+    """Return those choices that a request takes as the words of its command line, after the verb."""
+    declared, words = _declared(kind), list[str]()
     for name, value in choices.items():
-        action = declared[name]
-        if _is_switch(action):
+        if name not in declared:
+            continue
+        if _is_switch(declared[name]):
             words.append(f"--{name}")
         else:
             for each in value.split() if name == "link" else [value]:
@@ -121,9 +111,9 @@ def _words(choices: Mapping[str, str], declared: Mapping[str, argparse.Action]) 
     return words
 
 
-def shown_words(choices: Mapping[str, str]) -> list[str]:
+def shown_words(choices: Choices) -> list[str]:
     """Return choices as the words of the command line that is shown: a browser's camera needs the page."""
-    return [*run_words(choices), *(["--serve"] if is_browser(choices.get("camera", "")) else [])]
+    return [*words_of(choices), *(["--serve"] if is_browser(choices.get("camera", "")) else [])]
 
 
 def choices_of(given: Mapping[str, object]) -> dict[str, str]:
@@ -133,41 +123,49 @@ def choices_of(given: Mapping[str, object]) -> dict[str, str]:
         given: of `run`, by name.
     """
     found = {}
-    for name, action in _declared().items():
+    for name, action in _declared(RunRequest).items():
         value = given.get(action.dest)
         if name not in _NOT_CHOSEN and value != action.default and value is not None:
             found[name] = "yes" if _is_switch(action) else " ".join(value) if isinstance(value, list) else str(value)
     return found
 
 
-def run_request(words: Sequence[str]) -> RunRequest:
-    """Read words as `phone-host run` reads them.
+def given_by(choices: Choices, kind: type = RunRequest) -> dict[str, object]:
+    """Return the options of a request by name, as a command line gives them; what they say is not checked.
+
+    Raises:
+        SettingsError: one lacks its value, or has one of another kind.
+    """
+    return vars(_parser(kind).parse_args(words_of(choices, kind)))
+
+
+def request_of(choices: Choices, kind: type[T]) -> T:
+    """Make a request, or a group of options, of choices.
 
     Raises:
         SettingsError: they are not valid.
     """
-    return read_request(RunRequest, run_given(words))
+    return read_request(kind, given_by(choices, kind))
 
 
-def run_given(words: Sequence[str]) -> dict[str, object]:
-    """Return the options of words by name, as they were written; what they say is not checked.
+def asked_scan(values: Choices) -> ScanWanted:
+    """Return what the page wants of a scan, by the options of the command.
 
-    Raises:
-        SettingsError: there is no such option, or it lacks its value.
-    """
-    return vars(_parser().parse_args(list(words)))
-
-
-def calibrate_options(words: Sequence[str]) -> argparse.Namespace:
-    """Read words as `phone-host calibrate` reads them.
+    Args:
+        values: options of `scan` by name; what is missing or empty is as the command has it.
 
     Raises:
-        SettingsError: they are not valid.
+        SettingsError: the page may not give one of them, or it is invalid, or contradicts another.
     """
-    return _parser(calibrate_arguments.add_arguments).parse_args(list(words))
+    if unknown := set(values) - set(_OF_SCAN):
+        raise SettingsError(
+            f"{min(unknown)!r} is no option of a scan that the page can set", f"give some of {', '.join(_OF_SCAN)}"
+        )
+    chosen = {name: text for name, value in values.items() if (text := value.strip())}
+    return model_wanted(request_of(chosen, ModelOptions), None)
 
 
-def without_depth(choices: Mapping[str, str]) -> dict[str, str]:
+def without_depth(choices: Choices) -> dict[str, str]:
     """Return what of the choices a run without depth needs."""
     return {name: value for name, value in choices.items() if name in _SHORT}
 

@@ -1,4 +1,4 @@
-"""Starts the page's server, for `serve` and for `run --serve`, and tells where it is."""
+"""Starts the page's server, for `serve`, beside a run, and for a browser's camera; and tells where it is."""
 
 import shutil
 import subprocess
@@ -11,7 +11,19 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError
+from common.program.invocation import command_line
+from common.program.settings import Resolved
 from common.program.terminal import say
+from phone_host.camera.browser_feed import BrowserFeed
+from phone_host.camera.browser_uri import is_browser
+from phone_host.camera.http_uri import without_password
+from phone_host.declared_settings import PhoneHostSettings
+from phone_host.jobs.run_request import RunRequest
+from phone_host.output.axes import Axes
+from phone_host.serve.beside import BesideRun
+from phone_host.serve.choices import choices_of, shown_words
+from phone_host.serve.places import page_folder
+from phone_host.settings import key_folder
 from phone_host.web.invitation import by_cable, invitation, own_names
 from phone_host.web.secret_files import kept_credentials, kept_token
 from phone_host.web.server import PageServer
@@ -89,7 +101,7 @@ def tell_page(server: PageServer, settings: PageSettings) -> None:
         return
     names = own_names() if settings.host == _EVERYWHERE else (settings.host,)
     urls = [server.url_at(name) for name in names] or [server.url]
-    print(invitation(urls, settings.credentials), file=sys.stderr)
+    print(invitation(urls, settings.credentials), file=sys.stderr)  # noqa: T201 - a code made of characters, never fitted to a width
     say(by_cable(server.port), sys.stderr, flush=True)
 
 
@@ -107,3 +119,65 @@ def open_browser(url: str) -> None:
         else:
             return
     say(f"phone-host: {problem}: open the address by hand", sys.stderr, flush=True)
+
+
+@contextmanager
+def camera_page(uri: str, keys: Path) -> Iterator[BrowserFeed | None]:
+    """Serve the page while the block lasts, if a browser's camera is meant: it has no other way to give it.
+
+    Args:
+        uri: of the camera.
+        keys: folder of the secrets.
+
+    Raises:
+        UnavailableError: the port is taken, or a package is missing.
+    """
+    if not is_browser(uri):
+        yield None
+        return
+    page = BesideRun(
+        {"camera": uri},
+        lambda _: "",
+        snapshots=page_folder(None, "snapshots"),
+        recordings=page_folder(None, "recordings"),
+        axes=Axes.CAMERA,
+    )
+    settings = page_settings(None, keys)
+    with served(page, settings) as server:
+        _tell(server, settings, uri)
+        yield page.feed
+
+
+def _tell(server: PageServer, settings: PageSettings, camera: str) -> None:
+    say(f"phone-host: the page: {first_url(server, settings)}", sys.stderr, flush=True)
+    tell_page(server, settings)
+    if is_browser(camera):
+        say("phone-host: open it in the browser whose camera is meant, and start that camera", sys.stderr, flush=True)
+
+
+@contextmanager
+def page_beside(request: RunRequest, found: Resolved[PhoneHostSettings]) -> Iterator[BesideRun]:
+    """Serve the page of a run while the block lasts; its address is told on stderr.
+
+    Args:
+        request: of the run, of which nothing is open yet.
+        found: its settings.
+
+    Raises:
+        SettingsError: other machines reach the address that --serve names.
+        UnavailableError: the port is taken, or a package is missing.
+    """
+    values = found.values
+    choices = {**choices_of(request.given), "camera": without_password(values.camera)}
+    beside = BesideRun(
+        choices,
+        lambda chosen: command_line("phone-host", "run", *shown_words(chosen)),
+        snapshots=page_folder(request.out, "snapshots"),
+        recordings=page_folder(request.out, "recordings"),
+        axes=request.depth.axes,
+    )
+    address = request.serve if isinstance(request.serve, str) else None
+    settings = page_settings(address, key_folder(values.keys).path, lan=request.lan)
+    with served(beside, settings) as server:
+        _tell(server, settings, values.camera)
+        yield beside

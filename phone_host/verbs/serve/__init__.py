@@ -1,1 +1,0 @@
-"""phone-host serve: its options (light), and its command."""
