@@ -1,30 +1,30 @@
-"""Opens both cameras of a scanner: reads and checks the arguments of `open_scanner`."""
+"""Opens a run for a program: makes a request of the arguments of `open_scanner`."""
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import Final
 
-from common import now
 from common.errors import SettingsError
-from common.link.factory import LinkUri, open_links, parse_link, tell_insecure
-from common.stamp import HOST_CLOCK
+from common.program.settings import DEFAULT, Resolved
 from phone_host.api.scanner import Scanner
-from phone_host.camera.factory import open_camera
 from phone_host.camera.http_uri import without_password
-from phone_host.declared_settings import NEAR_M
-from phone_host.model import Rig, Side, StereoGeometry, TimeOffset
+from phone_host.declared_settings import NEAR_M, PhoneHostSettings
+from phone_host.jobs.options import RunCameraOptions
+from phone_host.jobs.run import open_run
+from phone_host.jobs.run_request import RunRequest, checked
+from phone_host.model import Rig, Side, StereoGeometry
 from phone_host.output.rig_files.imported import read_own_rig
-from phone_host.run.host_settings import HostSettings
-from phone_host.settings import key_folder
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.default_matcher import default_matcher, default_note
+from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.matcher_protocol import Matcher
 from phone_host.stereo.rectifier import Rectifier
-from phone_host.sync.fifo import FifoSettings
+
+_ORIGIN: Final = "open_scanner"
+"""Where a setting comes from, for settings.json."""
 
 
 def open_scanner(
@@ -60,11 +60,11 @@ def open_scanner(
         near_m: nearest depth to search for, m.
         board_side: which view the board's camera is, `left` or `right`. None: as in the rig; without a rig, left.
         fifo: depth and overflow policy of the queue before the matcher.
-        tolerance_ms: greatest time skew of a pair, ms. None: half of the longer frame period.
+        tolerance_ms: greatest time skew of a pair, ms. None or 0: half of the longer frame period.
         pairs: end after this many pairs. 0: no limit.
         wait_s: how long to wait for an absent board, s. None: for ever.
         lossless: give every result, and wait if the program is slower than the cameras.
-        out: folder for delays.jsonl, report.json and saved pairs. None: nothing is written.
+        out: folder for the results, as `phone-host run` writes it. None: nothing is written.
         save_every: save every Nth pair in `out`. 0: none.
         keys: folder of keys. None: the default folder.
 
@@ -78,47 +78,30 @@ def open_scanner(
     """
     given = dict(locals())
     _check_numbers(pairs=pairs, save_every=save_every, tolerance_ms=tolerance_ms, wait_s=wait_s, near_m=near_m)
-    uris = _addresses(link)
+    links = (link,) if isinstance(link, str) else tuple(link)
+    if not links:
+        raise SettingsError("no link is given", "give link='tcp://HOST:5555', or several")
     known = read_own_rig(Path(rig)) if isinstance(rig, str | Path) else rig
     if known is not None and geometry is not None:
         raise SettingsError("rig and geometry are both given", "leave geometry out: the rig has its own")
-    side = _side(board_side, known)
-    core = _core(known, geometry, matcher, disparities, near_m)
-    settings = HostSettings(
-        board_side=side,
-        tolerance_ns=None if tolerance_ms is None else round(tolerance_ms * 1e6),
-        fifo=FifoSettings.parse(fifo),
+    request = RunRequest(
+        cameras=RunCameraOptions(wait_s=wait_s),
+        board_side=_side(board_side, known),
         pairs=pairs,
-        wait_ns=None if wait_s is None else round(wait_s * 1e9),
         out=None if out is None else Path(out),
         save_every=save_every,
-        time_offset=TimeOffset() if known is None else known.time_offset,
-        resolved=_shown(given),
-        matcher_note="" if core is None or matcher is not None else default_note(),
     )
-    with ExitStack() as opened:  # if one part cannot be opened, close those that were
-        own = opened.enter_context(closing(open_camera(camera, HOST_CLOCK, now.monotonic_ns())))
-        links = open_links(uris, key_folder("" if keys is None else str(keys)))
-        for item in links:
-            opened.enter_context(closing(item))
-        scanner = Scanner(settings, own, links, core, lossless=lossless)
-        opened.pop_all()
-    return scanner
-
-
-def _addresses(link: str | Sequence[str]) -> list[LinkUri]:
-    """Read the links' addresses; warn of those that anybody can listen to.
-
-    Raises:
-        SettingsError: there is none, or one is invalid.
-    """
-    named = [link] if isinstance(link, str) else list(link)
-    if not named:
-        raise SettingsError("no link is given", "give link='tcp://HOST:5555', or several")
-    uris = [parse_link(address, listens_by_default=False) for address in named]
-    for uri in uris:
-        tell_insecure(uri)
-    return uris
+    values = PhoneHostSettings(
+        link=links,
+        camera=camera,
+        matcher=matcher if isinstance(matcher, str) else default_matcher().value,
+        tolerance=tolerance_ms or 0.0,
+        fifo=fifo,
+        keys="" if keys is None else str(keys),
+    )
+    found = checked(request, Resolved(values, (("matcher", DEFAULT if matcher is None else _ORIGIN),)))
+    core = _core(known, geometry, matcher, disparities, near_m)
+    return Scanner(open_run(request, found, lambda _: None, core=core), _shown(given), lossless=lossless)
 
 
 def _check_numbers(**numbers: float | None) -> None:
@@ -141,7 +124,7 @@ def _shown(arguments: Mapping[str, object]) -> dict[str, object]:
     told["camera"] = without_password(str(told["camera"]))
     told["link"] = told["link"] if isinstance(told["link"], str) else " ".join(str(item) for item in arguments["link"])  # type: ignore[attr-defined]  # texts, as annotated
     return {
-        name: {"value": value if isinstance(value, plain) else type(value).__name__, "origin": "open_scanner"}
+        name: {"value": value if isinstance(value, plain) else type(value).__name__, "origin": _ORIGIN}
         for name, value in told.items()
     }
 

@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from types import TracebackType
 from typing import Final, Self
 
@@ -13,11 +13,10 @@ from common.link.base import Link
 from common.protocol.message import Pacing
 from phone_host.accounts.delays import Series, SinkAccount
 from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.jobs.run import Opened
 from phone_host.model import Result
-from phone_host.report.run_json import build
-from phone_host.run.host import Host
-from phone_host.run.host_settings import EndReason, HostSettings
-from phone_host.stereo.core import StereoCore
+from phone_host.recording.playback import Playback
+from phone_host.run.host_settings import EndReason
 
 _DEPTH: Final = 2
 
@@ -26,25 +25,17 @@ class Scanner:
     """A running scan: a context manager and an iterable of results, in the order of the pairs. Made by `open_scanner`.
 
     Args:
-        settings: settings of the run.
-        camera: the host camera, open.
-        links: links to the board, open.
-        core: computes the depth. None: pairs and delays only.
+        opened: the run.
+        told: content of settings.json.
         lossless: whether the program gets every result.
     """
 
-    def __init__(
-        self,
-        settings: HostSettings,
-        camera: Camera,
-        links: Sequence[Link],
-        core: StereoCore | None,
-        *,
-        lossless: bool,
-    ) -> None:
+    def __init__(self, opened: Opened, told: Mapping[str, object], *, lossless: bool) -> None:
+        camera = opened.camera
+        assert not isinstance(camera, Playback)  # no argument asks for one
         self._results = _ResultQueue(waits=lossless or camera.description.pacing is Pacing.DEMAND)
-        self._host = Host(settings, camera, links, core, [self._results])
-        self._opened: tuple[Camera | Link, ...] = (camera, *links)
+        self._prepared = opened.prepared((), [self._results], told)
+        self._opened: tuple[Camera | Link, ...] = (camera, *opened.links)
         self._was_entered = False
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="scanner", daemon=True)
@@ -80,7 +71,7 @@ class Scanner:
         """Release camera, links and folder of a scanner that was never entered. An entered one releases them itself."""
         if not self._was_entered:
             self._was_entered = True
-            self._host.abandon()
+            self._prepared.host.abandon()
             for item in self._opened:
                 item.close()
 
@@ -100,19 +91,20 @@ class Scanner:
 
     def snapshot(self) -> RunSnapshot:
         """Return delays, accounts, clock, doubts and drops as of now, or as of the end of the run."""
+        host = self._prepared.host
         if self._failure is not None:
-            return self._host.snapshot("failed", diagnostic_of(self._failure))
-        return self._host.snapshot("running" if self.ended is None else self.ended.value)
+            return host.snapshot("failed", diagnostic_of(self._failure))
+        return host.snapshot("running" if self.ended is None else self.ended.value)
 
     def _run(self) -> None:
+        run = self._prepared
         try:
-            self.ended = self._host.run(self._stopping.is_set)
+            self.ended = run.host.run(self._stopping.is_set)
         except BaseException as error:  # noqa: BLE001 - a thread's root: the iterator raises it
             self._failure = error
         try:
-            snapshot = self.snapshot()
-            is_whole = self._failure is None and snapshot.processed > 0
-            self.is_complete = self._host.write_report(build(snapshot), replaces_earlier=is_whole)
+            over = run.ended(self.ended) if self.ended else run.failed(diagnostic_of(self._failure or RuntimeError()))
+            self.is_complete = over.is_complete
         except Exception as error:  # noqa: BLE001 - as above
             self._failure = self._failure or error
         finally:

@@ -1,6 +1,6 @@
 """A run as its request describes it, whoever asks: `run` itself, `scan`, or the page. Prepares it, and writes its report."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -71,12 +71,15 @@ class Opened:
     core: StereoCore | None
     board_side: Side
 
-    def prepared(self, words: Sequence[str], sinks: Sequence[Sink] = ()) -> "PreparedRun":
+    def prepared(
+        self, words: Sequence[str], sinks: Sequence[Sink] = (), told: Mapping[str, object] | None = None
+    ) -> "PreparedRun":
         """Take the results folder; whatever cannot be had closes the rest.
 
         Args:
             words: of the command line, from which settings.json knows what was given.
             sinks: further ones.
+            told: content of settings.json; None: the settings and options.
 
         Raises:
             SettingsError: options contradict each other.
@@ -90,7 +93,7 @@ class Opened:
                 opened.enter_context(closing(link))
             if self.request.out is not None:
                 announce_other_report(self.request.out, "run")
-            settings = _host_settings(self, words)
+            settings = _host_settings(self, words, told)
             recording = self._recording(settings)
             if recording is not None and self.request.record_topics:
                 sinks = (*sinks, ComputedSink(recording, self.request.record_topics, self.board_side))
@@ -202,6 +205,7 @@ def open_run(
     found: Resolved[PhoneHostSettings],
     tell: Callable[[str], None],
     feed: BrowserFeed | None = None,
+    core: StereoCore | None = None,
 ) -> Opened:
     """Open the camera, the core and the links of a run.
 
@@ -210,6 +214,7 @@ def open_run(
         found: its settings, from `checked`.
         tell: takes a line that the user should know.
         feed: brings browsers that give their cameras; None: there is no page.
+        core: computes depth; None: as the request says.
 
     Raises:
         SettingsError: options contradict each other.
@@ -229,7 +234,9 @@ def open_run(
     with ExitStack() as opened:  # what cannot be had closes what was
         camera = open_camera(settings.camera, HOST_CLOCK, now.monotonic_ns(), settings.most_pixels, feed)
         opened.enter_context(closing(camera))
-        core, board_side = _core(request, settings, upright_px(camera), tell)
+        board_side = request.board_side or Side.LEFT
+        if core is None:
+            core, board_side = _core(request, settings, upright_px(camera), tell)
         overlay_of(request.depth, core)
         budget_wanted(request, found, core)
         keys = key_folder(settings.keys)
@@ -331,13 +338,13 @@ def _core(
     return core, board_side
 
 
-def _host_settings(opened: Opened, words: Sequence[str]) -> HostSettings:
+def _host_settings(opened: Opened, words: Sequence[str], told: Mapping[str, object] | None) -> HostSettings:
     request, found, core = opened.request, opened.found, opened.core
     settings, wait_s = found.values, patience_s(request.cameras.wait_s, request.duration_s)
     shown = replace(found, values=replace(settings, camera=without_password(settings.camera)))
     return HostSettings(
         matcher_note="" if core is None or matcher_is_given(found) else default_note(),
-        resolved=with_origins(shown, request.given, words),
+        resolved=told or with_origins(shown, request.given, words),
         board_side=opened.board_side,
         tolerance_ns=round(settings.tolerance * 1e6) if settings.tolerance else None,
         fifo=FifoSettings.parse(settings.fifo),

@@ -133,16 +133,17 @@ class RunRequest(Request):
     )
 
 
-def checked(request: RunRequest) -> Resolved[PhoneHostSettings]:
-    """Resolve the settings and check them and all numbers, as far as that can be done without opening anything.
+def checked(request: RunRequest, found: Resolved[PhoneHostSettings] | None = None) -> Resolved[PhoneHostSettings]:
+    """Check the settings and all numbers, as far as that can be done without opening anything.
 
     Args:
         request: of the run.
+        found: its settings; None: they are resolved from options, environment and file.
 
     Raises:
         SettingsError: a setting or an option is not valid.
     """
-    found = resolve_settings(request.given)
+    found = found or resolve_settings(request.given)
     check(found.values)
     _check(request)
     depth_wanted(request.depth)
