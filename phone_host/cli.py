@@ -38,7 +38,7 @@ _VERBS: Final = {
 _NATIVE: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
 
-_PACKAGES: Final = frozenset({"calibrate", "measure", "quality", "relief", "stereo"})
+_PACKAGES: Final = frozenset({"calibrate"})
 """Verbs that still take argparse's options."""
 
 _WITHOUT_NUMPY: Final = frozenset({"doctor", "keys", "pair", "settings"})

@@ -23,9 +23,9 @@ from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.discovery.discovery import remember
 from phone_host.discovery.opened import open_named
-from phone_host.jobs.depth import build_core, overlay_of
 from phone_host.jobs.output_folders import announce_other_report, require_alone, spare_inputs
 from phone_host.jobs.run_request import RunRequest, budget_wanted, with_own_rig
+from phone_host.jobs.stereo_core import build_core, overlay_of
 from phone_host.model import Rig, Side, TimeOffset
 from phone_host.output.json_text import json_text
 from phone_host.recording.begin import begin_recording

@@ -20,11 +20,11 @@ from phone_host.camera.http_uri import without_password
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
-from phone_host.jobs.depth import refuse_rejected
 from phone_host.jobs.run import PreparedRun, open_run
 from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.jobs.scan import PreparedScan, SinksOf, prepare_scan
 from phone_host.jobs.scan_request import ScanRequest, axes_beside
+from phone_host.jobs.stereo_core import refuse_rejected
 from phone_host.live.calibration import LiveCalibration
 from phone_host.live.calibration_view import Shows
 from phone_host.output.axes import Axes

@@ -1,6 +1,5 @@
 """phone-host scan: put pairs from several places together to one model."""
 
-import argparse
 import sys
 from typing import TYPE_CHECKING
 
@@ -8,7 +7,7 @@ from common.errors import SettingsError
 from common.program.commandline import CHECK_FAILED, INTERRUPTED
 from common.program.signals import StopSignals
 from common.program.terminal import say
-from phone_host.jobs.depth import require_metres
+from phone_host.jobs.picture_pairs import file_pairs, reading, require_place
 from phone_host.jobs.scan_request import ScanRequest, axes_beside, model_wanted, resumed_of
 from phone_host.native.library import model_note, native
 from phone_host.output.json_text import json_text
@@ -19,7 +18,6 @@ from phone_host.report.scan_report import ScanReport
 from phone_host.run.host_settings import EndReason
 from phone_host.run.scan_files import NAMES
 from phone_host.run.scan_job import run_scan
-from phone_host.verbs.picture_pairs import file_pairs, reading, require_place
 
 if TYPE_CHECKING:
     from phone_host.jobs.scan import PreparedScan
@@ -55,9 +53,8 @@ def _scan_pictures(request: ScanRequest) -> ScanReport:
     for name in ("camera", "link", "replay", "record", "pairs", "seconds"):
         if request.given[name] != (0.0 if name == "seconds" else None):
             raise SettingsError(f"--{name} beside pictures", "give either pictures or cameras")
-    require_metres(request.depth)
     wanted = model_wanted(request.model, request.out)
-    pairs = file_pairs(argparse.Namespace(**request.given))
+    pairs = file_pairs(request.images, request.out, request.depth, request.pictures)
     require_place(pairs, NAMES, "scan")
     axes, resumed = axes_beside(request.depth.axes, wanted), resumed_of(request, _tell)
     with reading(pairs) as watcher:

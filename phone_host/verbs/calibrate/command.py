@@ -13,7 +13,6 @@ from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require
 from phone_host.verbs.calibrate.given import require_pictures
 from phone_host.verbs.calibrate.importing import import_calibration
 from phone_host.verbs.calibrate.report_json import report_values
-from phone_host.verbs.stereo_options import orientations
 
 
 def run(options: argparse.Namespace) -> int:
@@ -22,7 +21,6 @@ def run(options: argparse.Namespace) -> int:
         return import_calibration(options)
     require_pictures(options)
     asked = asked_of(options)
-    orientations(options)
     require_rig_place(options.out)
     require_alone(options.out.parent)
     live = None

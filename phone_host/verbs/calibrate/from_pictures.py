@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common.errors import DataError
+from common.program.request import read_request
 from phone_host.calibration.guide.unseen import guessed_corners, with_corners
 from phone_host.calibration.solve.series_snapshot import Taken
 from phone_host.calibration.target.board_views import Mounted, look_for_boards
 from phone_host.calibration.target.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.target.pairs import Reason
+from phone_host.jobs.options import ImageOptions
 from phone_host.jobs.output_folders import (
     announce_other_report,
     claim_names,
@@ -20,6 +22,7 @@ from phone_host.jobs.output_folders import (
     spare_names,
     written_beside,
 )
+from phone_host.jobs.picture_pairs import GivenPictures, given_pictures
 from phone_host.jobs.units import baseline_mm
 from phone_host.model import Side
 from phone_host.output.atomic import write_text
@@ -48,8 +51,6 @@ from phone_host.verbs.calibrate.report_json import report_values
 from phone_host.verbs.calibrate.rig_file import replace_rig, require_own
 from phone_host.verbs.calibrate.solving import Solved, solve_series
 from phone_host.verbs.calibrate.summary import pairing_notes, passed_over_notes, summary
-from phone_host.verbs.given_pictures import GivenPictures, given_pictures
-from phone_host.verbs.stereo_options import orientations
 
 if TYPE_CHECKING:  # cameras and links: 0.2 s that pictures need not wait for
     from phone_host.verbs.calibrate.live import Live
@@ -98,7 +99,7 @@ def calibrate_pictures(
         SettingsError: an option contradicts them.
         UnavailableError: a file cannot be read or written.
     """
-    mounted, out = orientations(options), options.out
+    mounted, out = read_request(ImageOptions, vars(options)).mounted, options.out
     if live is not None:
         given = GivenPictures((str(live.left),), (str(live.right),))
     else:

@@ -15,6 +15,7 @@ from common import now
 from common.errors import DataError, SettingsError
 from common.orientation import UPRIGHT
 from common.program import logs
+from common.program.request import read_request
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import say
@@ -36,7 +37,9 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.discovery.opened import open_named
+from phone_host.jobs.options import ImageOptions
 from phone_host.jobs.output_folders import require_folder, unwritable
+from phone_host.jobs.picture_pairs import VIEWS
 from phone_host.jobs.units import baseline_mm
 from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, Shows, SnapshotFiles, Spoken, tell_sides
@@ -50,8 +53,6 @@ from phone_host.verbs.calibrate.cause import assessed
 from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated, every_pair
 from phone_host.verbs.calibrate.given import command_again
 from phone_host.verbs.calibrate.hints import arrangement_hint
-from phone_host.verbs.given_pictures import VIEWS
-from phone_host.verbs.stereo_options import orientations
 
 _LOG = logging.getLogger(__name__)
 
@@ -294,7 +295,7 @@ def _check(options: argparse.Namespace) -> None:
             f"--live with {counted(len(options.images), 'folder')}",
             "name two folders for the pictures it takes, or none",
         )
-    if orientations(options) != (UPRIGHT, UPRIGHT):
+    if read_request(ImageOptions, vars(options)).mounted != (UPRIGHT, UPRIGHT):
         raise SettingsError(
             "--live does not take --rotate-left, --rotate-right, --flip-left or --flip-right",
             "add rotate= or flip= to the camera's address",

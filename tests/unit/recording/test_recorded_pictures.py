@@ -15,12 +15,12 @@ from common.frame import PixelFormat
 from common.orientation import Flip, Orientation
 from common.protocol.message import CameraDescription, Pacing
 from phone_host.calibration.target.cameras_beside import cameras_beside
+from phone_host.jobs.picture_pairs import given_pictures
 from phone_host.model import Side
 from phone_host.recording.chosen_views import MOST, NS, choose_views, stillest
 from phone_host.recording.copied import copy_recording
 from phone_host.recording.footage import read_recording
 from phone_host.stereo.view_files import pair_files
-from phone_host.verbs.given_pictures import given_pictures
 from tests.support.recorded import LATE_NS, PERIOD_NS, ZERO_NS, payload, recording, recording_file
 
 _ANY_SIZE = 10**6

@@ -3,7 +3,7 @@
 import pytest
 
 from common.errors import SettingsError
-from phone_host.verbs.globs import two_lists
+from phone_host.jobs.picture_pairs import two_lists
 
 
 @pytest.mark.parametrize(

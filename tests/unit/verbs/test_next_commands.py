@@ -13,9 +13,9 @@ from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.model import Arrangement
 from phone_host.output.axes import Axes
 from phone_host.output.pair_files import WrittenPair
+from phone_host.report.stereo_next import Typed, next_commands
 from phone_host.report.stereo_report import PairReport
 from phone_host.report.stereo_trust import PairTrust
-from phone_host.verbs.stereo.next_commands import Typed, next_commands
 
 _TYPED = Typed(
     words=("stereo", "im L.png", "r.png", "--rectified", "--out", "scan"),

@@ -13,7 +13,8 @@ import pytest
 from common.errors import DataError, SettingsError, TandemError
 from common.program.request import add_options, read_request
 from phone_host.cli import main
-from phone_host.jobs.depth import LimitedDepthOptions, build_core, depth_wanted, refuse_rejected
+from phone_host.jobs.depth import LimitedDepthOptions, depth_wanted
+from phone_host.jobs.stereo_core import build_core, refuse_rejected
 from phone_host.model import Crop, Side, StereoGeometry, Verdict
 from phone_host.output.axes import Axes
 from phone_host.output.rig_yaml import write_rig

@@ -1,9 +1,9 @@
 """phone-host measure: the distance of points, and between them."""
 
-import argparse
 import math
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -13,9 +13,12 @@ import numpy as np
 from common.errors import SettingsError
 from common.places import Kind, kind_of
 from common.program.commandline import CHECK_FAILED
+from common.program.request import Request, option, part
 from common.program.terminal import say
 from common.versions import REPORT_FORMAT
-from phone_host.jobs.depth import point_px
+from phone_host.jobs.depth import DEFAULT_NEAR_MM, OnePairDepthOptions, near_of, point_px
+from phone_host.jobs.options import ImageOptions
+from phone_host.jobs.picture_pairs import matching_of
 from phone_host.output.json_text import json_number, json_text
 from phone_host.run.progress_bar import step_bar
 from phone_host.run.seen_pair import (
@@ -24,12 +27,18 @@ from phone_host.run.seen_pair import (
     Measured,
     MissedPoint,
     Outcome,
+    Point,
     measure_points,
     point_text,
 )
 from phone_host.stereo.measured_point import Within, distance_between
 from phone_host.stereo.rig_errors import Known
-from phone_host.verbs.picture_pairs import matching_of
+
+EXAMPLES = """  phone-host measure left.png right.png --calibration rig.yaml --points 220,220
+  phone-host measure left.png right.png --calibration rig.yaml --points 220,220 310,230.5    # and the distance between the two
+  phone-host measure im0.png im1.png --calibration calib.txt --points 350,200 --json
+"""
+
 
 _NOISE: Final = "noise of both images"
 _RIG: Final = "the rig's calibration (covariance)"
@@ -48,18 +57,52 @@ _EVEN: Final = 0.05
 """Limits that differ by less than this share of themselves are written as one number."""
 
 
-def run(options: argparse.Namespace) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasureDepthOptions(OnePairDepthOptions):
+    """How the pair is matched. Limits and crops would only hide the points that are asked for."""
+
+    near_m: float | None = option(
+        "--near",
+        read=near_of,
+        metavar="MM",
+        help=f"look for nothing nearer; 20cm and 0.2m work, too (default: {DEFAULT_NEAR_MM:g} mm)",
+    )
+    disparities: int | None = option(
+        "--disparities", type=int, metavar="N", help="search disparities from 0 to N-1 px (default: as --near needs)"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasureRequest(Request):
+    """What measure can be told."""
+
+    left: str = option(metavar="LEFT", help="image of the left camera")
+    right: str = option(metavar="RIGHT", help="image of the right camera, taken at the same moment")
+    depth: MeasureDepthOptions = part(MeasureDepthOptions)
+    points_px: tuple[Point, ...] = option(
+        "--points",
+        read=lambda text, name: point_px(text, name, "X,Y in px, for example 312,240"),
+        nargs="+",
+        required=True,
+        metavar="X,Y",
+        help="points of the left image, px, as it is taken and upright; the centre of the first pixel is 0,0. Of several, the distance"
+        " from each to the next is told, too. A point that cannot be measured is named, the others are told; the exit code is then 4",
+    )
+    pictures: ImageOptions = part(ImageOptions)
+
+
+def run(request: MeasureRequest) -> int:
     """Match the pair, intersect the rays of each point, and print what came of it."""
-    for path in (options.left, options.right):
+    for path in (request.left, request.right):
         _require_image(path)
-    points = tuple(point_px(text, "--points", "X,Y in px, for example 312,240") for text in options.points)
-    left, right = Path(options.left), Path(options.right)
+    left, right = Path(request.left), Path(request.right)
     with step_bar("reading", None) as watcher:
-        found = measure_points(matching_of(options, left), left, right, points, watcher)
-    if options.json:
-        print(json_text(_report(options, points, found)))
+        matching = matching_of(request.depth, request.pictures, left)
+        found = measure_points(matching, left, right, request.points_px, watcher)
+    if request.as_json:
+        print(json_text(_report(request, found)))
     else:
-        say(_lines(options, points, found))
+        say(_lines(request, found))
     return CHECK_FAILED if any(isinstance(each, MissedPoint) for each in found.points) else 0
 
 
@@ -77,21 +120,21 @@ def _require_image(path: str) -> None:
             )
 
 
-def _parts(options: argparse.Namespace, found: Measured) -> tuple[list[str], list[str]]:
+def _parts(request: MeasureRequest, found: Measured) -> tuple[list[str], list[str]]:
     """Return which parts of the uncertainty are included, and which are not."""
     included, left_out = _PARTS[found.known]
-    return included, left_out if options.overlay is None else [*left_out, _OVERLAY]
+    return included, left_out if request.depth.overlay is None else [*left_out, _OVERLAY]
 
 
-def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> dict[str, Any]:
-    included, left_out = _parts(options, found)
+def _report(request: MeasureRequest, found: Measured) -> dict[str, Any]:
+    included, left_out = _parts(request, found)
     return {
         "format_version": REPORT_FORMAT,
         "command": "measure",
-        "left": options.left,
-        "right": options.right,
-        "calibration": options.calibration,
-        "points": [_point(at_px, outcome) for at_px, outcome in zip(points_px, found.points, strict=True)],
+        "left": request.left,
+        "right": request.right,
+        "calibration": request.depth.calibration,
+        "points": [_point(at_px, outcome) for at_px, outcome in zip(request.points_px, found.points, strict=True)],
         "between": [
             {
                 "from_point": number,
@@ -105,7 +148,7 @@ def _report(options: argparse.Namespace, points_px: tuple[tuple[float, float], .
     }
 
 
-def _point(at_px: tuple[float, float], outcome: Outcome) -> dict[str, Any]:
+def _point(at_px: Point, outcome: Outcome) -> dict[str, Any]:
     if isinstance(outcome, MissedPoint):
         return {"at_px": list(at_px), "problem": outcome.problem}
     point = outcome.point
@@ -136,9 +179,9 @@ def _values(length: Within) -> dict[str, float | None]:
     return {name: json_number(value * 1e3, 3) for name, value in limits.items()}
 
 
-def _lines(options: argparse.Namespace, points_px: tuple[tuple[float, float], ...], found: Measured) -> list[str]:
-    included, left_out = _parts(options, found)
-    lines = [_line(*each) for each in enumerate(zip(points_px, found.points, strict=True), start=1)]
+def _lines(request: MeasureRequest, found: Measured) -> list[str]:
+    included, left_out = _parts(request, found)
+    lines = [_line(*each) for each in enumerate(zip(request.points_px, found.points, strict=True), start=1)]
     lines += [
         f"{number} to {number + 1}   {'not measured' if length is None else _text(length)}"
         for number, length in enumerate(_path(found.points), start=1)
@@ -151,7 +194,7 @@ def _lines(options: argparse.Namespace, points_px: tuple[tuple[float, float], ..
     return lines
 
 
-def _line(number: int, asked: tuple[tuple[float, float], Outcome]) -> str:
+def _line(number: int, asked: tuple[Point, Outcome]) -> str:
     at_px, outcome = asked
     head = f"point {number}  at {point_text(at_px)} px"
     if isinstance(outcome, MissedPoint):

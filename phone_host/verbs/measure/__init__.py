@@ -1,1 +1,0 @@
-"""phone-host measure: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host quality: its options (light), and its command."""

@@ -1,1 +1,0 @@
-"""phone-host relief: its options (light), and its command."""

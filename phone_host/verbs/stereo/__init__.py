@@ -1,1 +1,0 @@
-"""phone-host stereo: its options (light), and its command."""
