@@ -200,7 +200,7 @@ class LimitedDepthOptions(DepthOptions):
 class OnePairDepthOptions(DepthOptions):
     """What a verb needs to know that measures the only pair of calibrated cameras."""
 
-    calibration: str = option(  # type: ignore[assignment]  # required here
+    calibration: str = option(  # required here
         "--calibration",
         required=True,
         metavar="FILE",
