@@ -119,11 +119,12 @@ def require_cameras(options: DepthOptions, *, needs_metres: bool = True) -> None
         SettingsError: there is neither --calibration nor --rectified, or no focal length and baseline with the latter.
     """
     if not options.calibration and not options.rectified:
-        more = "--focal PX --baseline MM" if needs_metres else "--disparities N"
-        raise SettingsError(
-            "neither --calibration nor --rectified is given",
-            f"give the rig.yaml of `phone-host calibrate`, or --rectified {more}",
+        remedy = (
+            "give the rig.yaml of `phone-host calibrate`, or --rectified --focal PX --baseline MM"
+            if needs_metres
+            else "give the rig.yaml of `phone-host calibrate`, or --rectified --disparities N"
         )
+        raise SettingsError("neither --calibration nor --rectified is given", remedy)
     if needs_metres and not options.calibration and options.focal_px is None and options.baseline_m is None:
         raise _no_metres()
 
