@@ -38,9 +38,6 @@ _VERBS: Final = {
 _NATIVE: Final = frozenset({"calibrate", "measure", "quality", "relief", "scan", "stereo"})
 """Verbs that spend seconds in native code on large images."""
 
-_PACKAGES: Final = frozenset({"calibrate"})
-"""Verbs that still take argparse's options."""
-
 _WITHOUT_NUMPY: Final = frozenset({"doctor", "keys", "pair", "settings"})
 """Verbs that run where numpy is missing; the doctor names it."""
 
@@ -97,7 +94,7 @@ def _run(options: argparse.Namespace) -> int:
     from phone_host.output.folder_lock import command_locks  # noqa: PLC0415 - the help needs none
 
     run, kind = command_of(options.verb)
-    request = options if kind is argparse.Namespace else read_request(kind, vars(options))
+    request = read_request(kind, vars(options))
     with interruptible(native=options.verb in _NATIVE), command_locks():
         return run(request)
 
@@ -106,10 +103,7 @@ def command_of(verb: str) -> tuple[Callable[[Any], int], type]:
     """Import a verb's module; return what runs it, and what that takes."""
     if verb not in _WITHOUT_NUMPY:
         importlib.import_module("numpy")  # before OpenCV, which prints three lines on stdout where numpy is missing
-    name = f"phone_host.verbs.{verb.replace('-', '_')}"
-    module = importlib.import_module(name)
-    if verb in _PACKAGES:
-        module = importlib.import_module(f"{name}.command")
+    module = importlib.import_module(f"phone_host.verbs.{verb.replace('-', '_')}")
     return module.run, next(iter(module.run.__annotations__.values()))
 
 
@@ -135,13 +129,8 @@ class _VerbParser(ExamplesFirstParser):
             return
         self._is_known, verb = True, self.prog.split()[-1]
         run, kind = command_of(verb)
-        if verb in _PACKAGES:
-            arguments = importlib.import_module(f"phone_host.verbs.{verb}.arguments")
-            self.description = f"examples:\n{arguments.EXAMPLES}"
-            arguments.add_arguments(self)
-        else:
-            self.description = f"examples:\n{run.__globals__['EXAMPLES']}"
-            add_options(self, kind)
+        self.description = f"examples:\n{run.__globals__['EXAMPLES']}"
+        add_options(self, kind)
         add_version_option(self)
         self.add_argument("--json", action="store_true", help="print one JSON object on stdout")
         self.add_argument("--debug", action="store_true", help="show tracebacks")

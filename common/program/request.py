@@ -31,6 +31,13 @@ class _Option:
     alone: bool
     declared: dict[str, Any]
 
+    @property
+    def usual(self) -> Any:  # noqa: ANN401 - of any field
+        """What counts as given where nothing is."""
+        if self.declared.get("action") == "store_true":
+            return False
+        return self.declared.get("default", [] if self.declared.get("nargs") == "*" else None)
+
     def called(self, name: str) -> str:
         """Return what a user calls it: the flag, or what stands for a positional argument."""
         return self.flags[0] if self.flags else str(self.declared.get("metavar", name))
@@ -63,9 +70,8 @@ def option(
         declared: what `ArgumentParser.add_argument` takes; the default is as a user writes it.
     """
     made = _Option(flags, read, number, alone, declared)
-    usual: Any = False if declared.get("action") == "store_true" else None
     is_required = declared.get("required", not flags and declared.get("nargs") not in {"?", "*"})
-    usual = MISSING if is_required else made.value(declared.get("default", usual), "")
+    usual = MISSING if is_required else made.value(made.usual, "")
     return field(default=usual, metadata={_OPTION: made})
 
 
@@ -137,3 +143,29 @@ def read_request(kind: type[T], given: Mapping[str, object]) -> T:
     if issubclass(kind, Request):
         values |= {"as_json": bool(given.get("json")), "given": given}
     return kind(**values)
+
+
+def given_words(kind: type, given: Mapping[str, object]) -> dict[str, list[str]]:
+    """Return the options that are not as usual, each by its name with the words of a command line that give it.
+
+    Args:
+        kind: a request, or a group of options.
+        given: values by the option's name, as they were written.
+    """
+    found: dict[str, list[str]] = {}
+    for item in fields(kind):
+        if _PART in item.metadata:
+            found |= given_words(item.metadata[_PART][0], given)
+        elif _OPTION in item.metadata and item.metadata[_OPTION].flags:
+            made: _Option = item.metadata[_OPTION]
+            key = made.key(item.name)
+            flag, value = made.flags[0], given.get(key, made.usual)
+            if value == made.usual:
+                continue
+            if isinstance(value, bool):
+                found[key] = [flag if value else f"--no-{flag.removeprefix('--')}"]
+            elif made.declared.get("action") == "append" and isinstance(value, list):
+                found[key] = [word for each in value for word in (flag, str(each))]
+            else:
+                found[key] = [flag, *map(str, value if isinstance(value, list) else [value])]
+    return found

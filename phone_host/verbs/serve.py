@@ -14,12 +14,16 @@ from common.plain_text import printable
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
-from common.program.request import Request, option
+from common.program.request import Request, add_options, option, read_request
 from common.program.signals import StopSignals
 from common.program.terminal import columns, say
 from common.words import counted
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.headline import headline
+from phone_host.jobs.calibrate.earlier import asked_of
+from phone_host.jobs.calibrate.live import prepare_views
+from phone_host.jobs.calibrate.pictures import calibrate_pictures, require_rig_place
+from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.options import LAN_HELP
 from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
@@ -29,10 +33,6 @@ from phone_host.serve.commands import Calibrated, Commands, ReadyCalibration
 from phone_host.serve.page import first_url, open_browser, page_settings, served, tell_page
 from phone_host.serve.station import Station
 from phone_host.settings import usual_file
-from phone_host.verbs.calibrate import arguments as calibrate_arguments
-from phone_host.verbs.calibrate.earlier import asked_of
-from phone_host.verbs.calibrate.from_pictures import calibrate_pictures, require_rig_place
-from phone_host.verbs.calibrate.live import prepare_views
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Activity, PageState
 
@@ -124,21 +124,21 @@ def live_calibration(words: Sequence[str], feed: BrowserFeed, sinks: Sequence[Si
         TandemError: as `prepare_views` and `require_rig_place`.
     """
     parser = StrictParser()
-    calibrate_arguments.add_arguments(parser)
-    options = parser.parse_args(list(words))
-    asked = asked_of(options)
-    require_rig_place(options.out)
-    views = prepare_views(options, asked, feed, sinks)
+    add_options(parser, CalibrateRequest)
+    request = read_request(CalibrateRequest, vars(parser.parse_args(list(words))))
+    asked = asked_of(request)
+    require_rig_place(request.out)
+    views = prepare_views(request, asked, feed, sinks)
 
     def finish(may_write: Callable[[], None]) -> Calibrated:
-        report = calibrate_pictures(options, asked, views.taken(_Nobody()), may_write).report
+        report = calibrate_pictures(request, asked, views.taken(_Nobody()), may_write).report
         if isinstance(report.result, DataError):
             trouble = diagnostic_of(report.result)
             return Calibrated(f"no calibration: {trouble.message}", trouble)
-        words = f"verdict {report.verdict.value}: {options.out}"
+        words = f"verdict {report.verdict.value}: {request.out}"
         if report.verdict is Verdict.REJECT:
             return Calibrated(words, Diagnostic("the calibration is rejected", report.remedy, Severity.FAIL))
-        return Calibrated(words, rig=options.out.absolute())
+        return Calibrated(words, rig=request.out.absolute())
 
     return ReadyCalibration(views.live, views.run, finish)
 

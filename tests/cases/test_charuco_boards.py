@@ -1,6 +1,5 @@
 """ChArUco boards of other printers: OpenCV before 4.6 and calib.io arrange the marks of boards with an even number of rows otherwise."""
 
-import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,10 +13,10 @@ from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.moving_board import SizeCheck
 from phone_host.model import Image
 from phone_host.output.rig_yaml import read_rig
-from phone_host.verbs.calibrate.arguments import add_arguments
-from phone_host.verbs.calibrate.command import run
+from phone_host.verbs.calibrate import run
 from tests.support.boards import poses
 from tests.support.pictures import encoded
+from tests.support.requests import request_of
 
 _SIZE_PX = (640, 480)
 _CAMERA = np.array([[560.0, 0.0, 320.0], [0.0, 560.0, 240.0], [0.0, 0.0, 1.0]])
@@ -73,12 +72,9 @@ def test_both_arrangements_give_the_same_rig(
     for index, pair in enumerate(_views(columns, rows, is_legacy=is_legacy)):
         for side, image in zip(("left", "right"), pair, strict=True):
             (tmp_path / side / f"{index}.png").write_bytes(encoded(".png", image))
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    parser.add_argument("--json", action="store_true")
     board = f"charuco:{columns}x{rows}:28mm:20mm:5x5"
     folders = [str(tmp_path / "left"), str(tmp_path / "right")]
-    assert run(parser.parse_args([*folders, "--board", board, "--out", str(tmp_path / "rig.yaml")])) == 0
+    assert run(request_of("calibrate", *folders, "--board", board, "--out", str(tmp_path / "rig.yaml"))) == 0
     rig = read_rig(tmp_path / "rig.yaml")
     np.testing.assert_allclose(rig.t_right_left_m, [-_BASELINE_M, 0, 0], atol=2e-4)
     np.testing.assert_allclose(rig.left.matrix[0, 0], 560, rtol=3e-3)

@@ -9,6 +9,7 @@ import pytest
 from common.errors import DataError
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.failure_modes.arrangement import Misplaced, composed, misplaced, turned_corners
+from phone_host.calibration.failure_modes.remedies import arrangement_hint
 from phone_host.calibration.solve.calibrate import Sizes, calibrate
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.solve.verdict import judge
@@ -17,7 +18,6 @@ from phone_host.calibration.target.corners import Board, Corners, agree
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Image, Side
 from phone_host.stereo.orient import upright
-from phone_host.verbs.calibrate.hints import arrangement_hint
 from tests.support.boards import BOARD, poses
 from tests.support.rigs import project_points, unlike_rig
 

@@ -15,13 +15,13 @@ from phone_host.calibration.failure_modes.deviating import deviation
 from phone_host.calibration.failure_modes.mistakes import Course, Mistake, mistaken, unturned
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.failure_modes.partners import wrong_partners
+from phone_host.calibration.failure_modes.remedies import assessed, with_cause
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.verdict import Assessment
 from phone_host.calibration.target.corners import find_corners
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import look_at
 from phone_host.model import Verdict
-from phone_host.verbs.calibrate.cause import assessed, with_cause
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.cause_judge import finding_of
 from tests.support.cause_real import real_pairs, variants

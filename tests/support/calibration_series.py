@@ -17,9 +17,8 @@ from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.target.small_picture import small_jpeg
 from phone_host.model import Verdict
 from phone_host.model.calibration_series import CalibrationSeries, RectifiedView
+from phone_host.report.calibration_report import CalibrationReport, Judged, Known, Origin
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.calibrate.board import Known, Origin
-from phone_host.verbs.calibrate.report import CalibrationReport, Judged
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 

@@ -1,6 +1,5 @@
 """The parts of a live calibration beside the guide: finding a moving board, the folders of pictures, the voice, the lines that are written."""
 
-import argparse
 import io
 import shlex
 import threading
@@ -25,6 +24,7 @@ from phone_host.calibration.target.corners import Board, find_corners
 from phone_host.calibration.target.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target.sharpness import BoardLook
 from phone_host.camera.factory import open_camera
+from phone_host.jobs.calibrate.live import ring_instead
 from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken
 from phone_host.live.newest import Newest
@@ -32,13 +32,11 @@ from phone_host.live.voice import Voice, speech_program
 from phone_host.model import Image, Verdict
 from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.run.host_settings import HostSettings
-from phone_host.verbs.calibrate.arguments import add_arguments
-from phone_host.verbs.calibrate.command import exit_code, run
-from phone_host.verbs.calibrate.given import command_again
-from phone_host.verbs.calibrate.live import ring_instead
+from phone_host.verbs.calibrate import exit_code, run
 from tests.support.boards import BOARD, poses, render_pair
 from tests.support.pictures import encoded
 from tests.support.programs import until
+from tests.support.requests import request_of
 from tests.support.rigs import small_rig
 
 _PAIR = render_pair(small_rig(), poses(1, seed=8, depth_m=(0.4, 0.5))[0])
@@ -253,24 +251,14 @@ def test_the_picture_and_the_files_show_the_words(tmp_path: Path) -> None:
 )
 def test_options_that_do_not_fit_are_refused(tmp_path: Path, options: list[str], problem: str) -> None:
     """Each in one line, before a camera is opened."""
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    parser.add_argument("--json", action="store_true")
     with pytest.raises(SettingsError, match=problem):
-        run(parser.parse_args([*options, "--square", "25mm", "--out", str(tmp_path / "rig.yaml")]))
+        run(request_of("calibrate", *options, "--square", "25mm", "--out", str(tmp_path / "rig.yaml")))
 
 
 def test_a_rejected_rig_counts_more_than_a_signal() -> None:
     """SIGTERM is exit 0 and Ctrl-C 130, but a check that failed is exit 4 in any case."""
     assert [exit_code(Verdict.GOOD, is_interrupted=each) for each in (False, True)] == [0, 130]
     assert [exit_code(Verdict.REJECT, is_interrupted=each) for each in (False, True)] == [4, 4]
-
-
-def _parsed(*words: str | Path) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    parser.add_argument("--json", action="store_true")
-    return parser.parse_args([*map(str, words)])
 
 
 def test_a_live_session_is_repeated_with_all_its_options() -> None:
@@ -288,11 +276,11 @@ def test_a_live_session_is_repeated_with_all_its_options() -> None:
         "--pose-only",
     ]
     kept += ["--export", "ros", "--export", "kalibr", "--board-side", "right", "--max-megapixels", "20"]
-    options = _parsed(*words, *kept, "--out", "new rig.yaml")
-    told = shlex.split(command_again(options, "my views/left", "right"))
+    request = request_of("calibrate", *words, *kept, "--out", "new rig.yaml")
+    told = shlex.split(request.again("my views/left", "right"))
     assert told[:4] == ["phone-host", "calibrate", "my views/left", "right"]
-    assert vars(_parsed(*told[2:])) == vars(_parsed("my views/left", "right", *kept, "--out", "new rig.yaml"))
-    assert command_again(_parsed("--live", "--from", "rig.yaml", "--out", "rig.yaml"), "l", "r") == ""
+    assert request_of(*told[1:]) == request_of("calibrate", "my views/left", "right", *kept, "--out", "new rig.yaml")
+    assert request_of("calibrate", "--live", "--from", "rig.yaml", "--out", "rig.yaml").again("l", "r") == ""
 
 
 class _EagerLock:

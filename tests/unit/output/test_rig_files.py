@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError, SettingsError, TandemError
+from phone_host.jobs.calibrate.request import EXPORTS
 from phone_host.model import Epipolar, Lens
 from phone_host.output.calib_txt import read_calib_txt
 from phone_host.output.rig_files.imported import RigKind, export_texts, import_rig
 from phone_host.output.rig_yaml import read_rig, write_rig
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.verbs.calibrate.arguments import EXPORTS
 from tests.support.rig_files import assert_same_rig, exported, fisheye_rig, four_rig, rational_rig
 from tests.support.rigs import stacked_rig, unlike_rig
 

@@ -1,6 +1,5 @@
 """phone-host calibrate --from: adding pictures to an earlier calibration, and solving the relative pose anew."""
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,18 +15,20 @@ from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.se3 import rotations_of, vectors_of
+from phone_host.jobs.calibrate.board import Named
+from phone_host.jobs.calibrate.earlier import Series, asked_of, calibrated, every_pair, notes, series_of
+from phone_host.jobs.calibrate.request import CalibrateRequest
+from phone_host.jobs.calibrate.rig_file import replace_rig
 from phone_host.model import Lens, Rectification, Rig, Side, TimeOffset, Verdict
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
+from phone_host.report.calibration_report import Known, Origin
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.scaled_rig import scaled_rig
-from phone_host.verbs.calibrate.arguments import add_arguments
-from phone_host.verbs.calibrate.board import Known, Named, Origin
-from phone_host.verbs.calibrate.command import run
-from phone_host.verbs.calibrate.earlier import Series, asked_of, calibrated, every_pair, notes, series_of
-from phone_host.verbs.calibrate.rig_file import replace_rig
+from phone_host.verbs.calibrate import run
 from tests.support.boards import BOARD, exact_pairs, poses, render_pair
 from tests.support.pictures import encoded
+from tests.support.requests import request_of
 from tests.support.rigs import small_rig, unlike_rig
 
 _SIZES = ((640, 480), (1280, 720))
@@ -41,16 +42,16 @@ def _moved(rig: Rig) -> Rig:
     )
 
 
-def _options(folder: Path, *given: str) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    parser.add_argument("--json", action="store_true")
-    return parser.parse_args([str(folder / "left"), str(folder / "right"), *given, "--out", str(folder / "new.yaml")])
+def _request(folder: Path, *given: str) -> CalibrateRequest:
+    words = (str(folder / "left"), str(folder / "right"), *given, "--out", str(folder / "new.yaml"))
+    made = request_of("calibrate", *words)
+    assert isinstance(made, CalibrateRequest)
+    return made
 
 
-def _series(options: argparse.Namespace) -> Series:
+def _series(request: CalibrateRequest) -> Series:
     """The series, where the pictures show the board that is named, or the usual one."""
-    return series_of(options, asked_of(options), lambda named: Known(named.board or BOARD, Origin.OPTION))[0]
+    return series_of(request, asked_of(request), lambda named: Known(named.board or BOARD, Origin.OPTION))[0]
 
 
 def _written(folder: Path, pairs: list[BoardPair], *, with_views: bool = True) -> Path:
@@ -67,7 +68,7 @@ def test_added_views_are_solved_together_with_the_earlier_ones(tmp_path: Path) -
     """Six pairs in the file and six new ones give what twelve give at once; what the file knows besides stays."""
     pairs = exact_pairs(unlike_rig(), poses(12, seed=3), noise_px=0.1)
     path = _written(tmp_path, pairs[:6])
-    series = _series(_options(tmp_path, "--from", str(path)))
+    series = _series(_request(tmp_path, "--from", str(path)))
     later = [replace(pair, name=str(number)) for number, pair in enumerate(pairs[6:])]
     found = calibrated(series, every_pair(series, later, _SIZES), _SIZES)
     at_once = calibrate(pairs, BOARD, _SIZES)
@@ -81,7 +82,7 @@ def test_pictures_that_are_in_the_rig_already_do_not_count_twice(tmp_path: Path)
     """Of three known pairs and six new ones the six are added; known ones alone are refused."""
     pairs = exact_pairs(unlike_rig(), poses(12, seed=3), noise_px=0.1)
     path = _written(tmp_path, pairs[:6])
-    series = _series(_options(tmp_path, "--from", str(path)))
+    series = _series(_request(tmp_path, "--from", str(path)))
     assert [pair.name for pair in every_pair(series, pairs[3:], _SIZES)] == [pair.name for pair in pairs]
     assert notes(series, pairs[3:], _SIZES) == [f"from     6 pairs of {path} and 6 new ones; 3 were in it already"]
     with pytest.raises(DataError, match=r"in .*rig\.yaml already"):
@@ -120,7 +121,7 @@ def test_lenses_are_scaled_to_new_pictures_and_that_is_said(tmp_path: Path) -> N
     path = _written(tmp_path, exact_pairs(truth, poses(7, seed=1), noise_px=0.02), with_views=False)
     sizes = ((1280, 960), (1280, 680))
     seen = exact_pairs(scaled_rig(truth, *sizes), poses(6, seed=2), noise_px=0.02)
-    series = _series(_options(tmp_path, "--from", str(path), "--pose-only", "--board", "9x6", "--square", "25mm"))
+    series = _series(_request(tmp_path, "--from", str(path), "--pose-only", "--board", "9x6", "--square", "25mm"))
     found = calibrated(series, seen, sizes)
     np.testing.assert_allclose(found.rig.t_right_left_m, truth.t_right_left_m, atol=3e-4)
     said = notes(series, seen, sizes)
@@ -128,7 +129,7 @@ def test_lenses_are_scaled_to_new_pictures_and_that_is_said(tmp_path: Path) -> N
     assert said[2].endswith("the right lens is cropped to its middle: 1280x720 to 1280x680 px")
     path = _written(tmp_path, exact_pairs(truth, poses(5, seed=1)))
     with pytest.raises(DataError, match=r"the new left pictures are 1280x960 px, those of .*rig.yaml 640x480 px"):
-        every_pair(_series(_options(tmp_path, "--from", str(path))), seen, sizes)
+        every_pair(_series(_request(tmp_path, "--from", str(path))), seen, sizes)
 
 
 def test_what_contradicts_the_earlier_calibration_is_refused(tmp_path: Path) -> None:
@@ -146,15 +147,15 @@ def test_what_contradicts_the_earlier_calibration_is_refused(tmp_path: Path) -> 
         (("--board", "9x6"), "--square is missing"),
     ):
         with pytest.raises(SettingsError) as caught:
-            _series(_options(tmp_path, *given))
+            _series(_request(tmp_path, *given))
         assert said in str(caught.value)
     for again in ("--pose-only", "--board 9x6", "--board auto", "--square 25mm"):
-        assert _series(_options(tmp_path, "--from", path, *again.split())).board == BOARD
+        assert _series(_request(tmp_path, "--from", path, *again.split())).board == BOARD
     small = ("--pose-only", "--board", "8x6", "--square", "30mm")
-    assert _series(_options(tmp_path, "--from", path, *small)).board == Board(8, 6, 0.03)
+    assert _series(_request(tmp_path, "--from", path, *small)).board == Board(8, 6, 0.03)
     bare = str(_written(tmp_path, pairs, with_views=False))
     with pytest.raises(DataError, match="does not hold the corners it was computed from"):
-        _series(_options(tmp_path, "--from", bare))
+        _series(_request(tmp_path, "--from", bare))
 
 
 def _filed(folder: Path, board: Board) -> Path:
@@ -180,9 +181,9 @@ def _another_board(named: Named) -> Known:
 
 def test_another_board_in_the_new_pictures_is_named_as_that(tmp_path: Path) -> None:
     """Nobody gave --board, so the error does not speak of it but of the file."""
-    options = _options(tmp_path, "--from", str(_filed(tmp_path, BOARD)))
+    request = _request(tmp_path, "--from", str(_filed(tmp_path, BOARD)))
     with pytest.raises(DataError, match=r"another board than .*rig\.yaml holds"):
-        series_of(options, asked_of(options), _another_board)
+        series_of(request, asked_of(request), _another_board)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +198,7 @@ def test_the_earlier_calibration_knows_its_board_with_its_marks(tmp_path: Path, 
     assert (again.columns, again.rows, again.square_m) == (board.columns, board.rows, board.square_m)
     np.testing.assert_allclose(again.points_m(), board.points_m(), rtol=1e-7)
     assert type(again.marks) is type(board.marks)
-    known = _series(_options(tmp_path, "--from", str(tmp_path / "rig.yaml"), "--board", name)).board
+    known = _series(_request(tmp_path, "--from", str(tmp_path / "rig.yaml"), "--board", name)).board
     assert known == again
     with pytest.raises(DataError, match="the earlier calibration is 'charuco:9x9"):
         board_of(replace(read, board="charuco:9x9:28mm:20mm:5x5"))
@@ -213,9 +214,9 @@ def test_pictures_of_another_size_are_refused_before_they_are_searched(tmp_path:
         for number in range(3):
             (tmp_path / side / f"{number}.png").write_bytes(encoded(".png", np.zeros((48, 64), np.uint8)))
     with pytest.raises(DataError, match=r"the new left pictures are 64x48 px, .*640x480 px.*alone, without --from"):
-        run(_options(tmp_path, "--from", path))
+        run(_request(tmp_path, "--from", path))
     with pytest.raises(DataError, match="right image is 64x48 px, neither a scaling nor a crop"):
-        run(_options(tmp_path, "--from", path, "--pose-only"))
+        run(_request(tmp_path, "--from", path, "--pose-only"))
 
 
 def test_the_command_adds_to_a_rig_and_solves_the_pose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -226,14 +227,14 @@ def test_the_command_adds_to_a_rig_and_solves_the_pose(tmp_path: Path, capsys: p
             folder.mkdir(parents=True, exist_ok=True)
             (folder / f"{index % 4}.png").write_bytes(encoded(".png", image))
     first, second = tmp_path / "first", tmp_path / "second"
-    run(_options(first, "--board", "9x6", "--square", "25mm"))
-    run(_options(second, "--from", str(first / "new.yaml")))
+    run(_request(first, "--board", "9x6", "--square", "25mm"))
+    run(_request(second, "--from", str(first / "new.yaml")))
     views = read_rig_views(second / "new.yaml")
     assert views is not None
     assert views.board == "9x6"
     assert len(set(views.names)) == len(views.names) == len(pairs_of(views)) > 5
     both = (second / "new.yaml").read_bytes()
-    run(_options(second, "--from", str(second / "new.yaml"), "--pose-only"))
+    run(_request(second, "--from", str(second / "new.yaml"), "--pose-only"))
     assert read_rig_views(second / "new.yaml") is None
     assert (second / "new.yaml.old").read_bytes() == both
     np.testing.assert_allclose(

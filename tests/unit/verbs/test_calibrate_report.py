@@ -16,8 +16,8 @@ from phone_host.calibration.solve.verdict import Assessment
 from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import Imported, RigKind
-from phone_host.verbs.calibrate.report import Exported, ImportReport, Judged
-from phone_host.verbs.calibrate.report_json import import_values, report_values
+from phone_host.report.calibration_json import import_values, report_values
+from phone_host.report.calibration_report import Exported, ImportReport, Judged
 from tests.support.calibration_series import calibration, calibration_report
 from tests.support.rigs import unlike_rig
 

@@ -1,6 +1,5 @@
 """phone-host calibrate in this process: what it writes when it rejects, and what it says about turned photographs."""
 
-import argparse
 import json
 import math
 from collections.abc import Callable
@@ -17,18 +16,18 @@ from common.recording.layout import ABOUT, About, image_topic
 from common.recording.recording_file import written
 from common.recording.ros_messages import COMPRESSED_IMAGE, RecordedImage, image_message
 from phone_host.calibration.failure_modes.mistakes import Mistake, mistaken
+from phone_host.calibration.failure_modes.remedies import with_cause
 from phone_host.calibration.solve.verdict import Assessment
 from phone_host.model import Image, Side, Verdict
 from phone_host.output.rig_yaml import read_rig
-from phone_host.verbs.calibrate.arguments import add_arguments
-from phone_host.verbs.calibrate.cause import with_cause
-from phone_host.verbs.calibrate.command import run
-from phone_host.verbs.calibrate.report import Judged
-from phone_host.verbs.calibrate.summary import passed_over_notes, summary
+from phone_host.report.calibration_lines import passed_over_notes, summary
+from phone_host.report.calibration_report import Judged
+from phone_host.verbs.calibrate import run
 from tests.support.boards import poses, render_pair
 from tests.support.calibration_series import calibration, calibration_report
 from tests.support.oriented import oriented
 from tests.support.pictures import encoded
+from tests.support.requests import request_of
 from tests.support.rigs import small_rig
 
 _PAIRS = [render_pair(small_rig(), pose) for pose in poses(4, seed=8, depth_m=(0.4, 0.5))]
@@ -53,11 +52,8 @@ def _shaken(image: Image) -> Image:
 
 def _calibrate(folder: Path, *options: str, images: tuple[str, ...] = ()) -> tuple[int, dict[str, Any]]:
     """Exit code and report.json; `images` in place of the folders left and right."""
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
-    parser.add_argument("--json", action="store_true")
     given = [*(images or (str(folder / "left"), str(folder / "right"))), "--board", "9x6", "--square", "25mm", *options]
-    code = run(parser.parse_args([*given, "--out", str(folder / "rig.yaml")]))
+    code = run(request_of("calibrate", *given, "--out", str(folder / "rig.yaml")))
     report: dict[str, Any] = json.loads((folder / "report.json").read_text())
     return code, report
 
@@ -165,11 +161,9 @@ def test_folders_out_of_step_are_told_before_anything_is_fitted(
 @pytest.mark.parametrize("square", ["0.025", "0.3"])
 def test_a_square_without_a_unit_that_no_board_has_is_refused(tmp_path: Path, square: str) -> None:
     """0.025 could be metres or a slip; both ways to write the metres are named, before any image is read."""
-    parser = argparse.ArgumentParser()
-    add_arguments(parser)
     given = ["none", "none", "--board", "9x6", "--square", square, "--out", str(tmp_path / "rig.yaml")]
     with pytest.raises(SettingsError, match=rf"write {float(square) * 1000:g}mm or {square}m"):
-        run(parser.parse_args(given))
+        request_of("calibrate", *given)
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,9 @@ import pytest
 
 from common.errors import DataError
 from phone_host.calibration.failure_modes.out_of_step import out_of_step
+from phone_host.calibration.failure_modes.remedies import out_of_step_error
 from phone_host.calibration.target.pairs import FileCorners
 from phone_host.model import Side
-from phone_host.verbs.calibrate.hints import out_of_step_error
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 

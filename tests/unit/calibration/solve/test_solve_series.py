@@ -1,6 +1,5 @@
 """From the board in the pictures to a rig: a drift of the cameras is taken out, and what rig.yaml keeps of the pictures is as they were seen."""
 
-import argparse
 import math
 from dataclasses import replace
 from functools import cache
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from common.orientation import UPRIGHT, Flip, Orientation
+from common.orientation import Flip, Orientation
 from phone_host.calibration.failure_modes.arrangement import turned_corners
 from phone_host.calibration.failure_modes.mistakes import Course, Mistake
 from phone_host.calibration.solve.bend import Bend
@@ -21,13 +20,13 @@ from phone_host.calibration.solve.verdict import judge
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.se3 import vectors_of
+from phone_host.jobs.calibrate.earlier import Series, saved_views
+from phone_host.jobs.calibrate.pictures import Solved, judged, solve_series
+from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.model import Rig, Side, Verdict
 from phone_host.output.rig_yaml import read_rig_views, write_rig
+from phone_host.report.calibration_report import Judged
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.calibrate.earlier import Series, saved_views
-from phone_host.verbs.calibrate.from_pictures import _judged
-from phone_host.verbs.calibrate.report import Judged
-from phone_host.verbs.calibrate.solving import Solved, solve_series
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 
@@ -113,13 +112,13 @@ def test_pictures_from_folders_are_judged_as_live_ones(verdict: Verdict, *, pose
     assert judge(found, ()).verdict is Verdict.GOOD
     views = BoardViews(pairs=tuple(pairs), rejected=(), sizes_px=_SIZES)
     solved = Solved(views=views, seen=pairs, pairs=pairs, found=replace(found, bends=(Bend.WIDE, Bend.USUAL)))
-    options = argparse.Namespace(live=False, pose_only=pose_only, max_megapixels=None, baseline=None)
+    request = CalibrateRequest(pose_only=pose_only, out=Path("rig.yaml"))
     files = ViewFiles(pairs=(), by_number=True, by_name=False, left_alone=(), right_alone=())
     series = Series(board=BOARD, side=Side.LEFT, path=Path())
-    judged = _judged(files, series, solved, options, (UPRIGHT, UPRIGHT))
-    assert isinstance(judged, Judged)
-    assert judged.judgement.verdict is verdict
-    assert ("no board was seen in the" in judged.judgement.remedy) is (verdict is Verdict.USABLE)
+    found_rig = judged(files, series, solved, request)
+    assert isinstance(found_rig, Judged)
+    assert found_rig.judgement.verdict is verdict
+    assert ("no board was seen in the" in found_rig.judgement.remedy) is (verdict is Verdict.USABLE)
 
 
 def test_mirrored_new_pictures_are_named_so_beside_earlier_ones(tmp_path: Path) -> None:

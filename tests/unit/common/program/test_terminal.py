@@ -18,9 +18,9 @@ from common.program.terminal import columns, folded
 from phone_host.accounts.link_account import LinkAccount, LinkTally
 from phone_host.bench.tables import narrow_rows
 from phone_host.calibration.target.pairs import Reason, Rejected
+from phone_host.report.calibration_lines import rejections
 from phone_host.report.summary import summary
 from phone_host.run.terminal_view import LiveTable
-from phone_host.verbs.calibrate.summary import rejections
 from tests.support.bench_results import result
 from tests.support.run_snapshots import MS, run
 from tests.support.samples import LEDGER

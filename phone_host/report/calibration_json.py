@@ -15,8 +15,7 @@ from phone_host.calibration.solve.result import Calibration, LensTrial, Used
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.model import Rig
 from phone_host.output.json_text import json_number
-from phone_host.verbs.calibrate.board import Known
-from phone_host.verbs.calibrate.report import CalibrationReport, Exported, ImportReport, Judged
+from phone_host.report.calibration_report import CalibrationReport, Exported, ImportReport, Judged, Known
 
 
 def report_values(report: CalibrationReport) -> dict[str, Any]:

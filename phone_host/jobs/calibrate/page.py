@@ -16,8 +16,8 @@ from phone_host.model.calibration_series import CalibrationSeries
 from phone_host.output.atomic import write_text
 from phone_host.output.report_owner import PAGE
 from phone_host.report.calibration_page import calibration_page
+from phone_host.report.calibration_report import Judged
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.calibrate.report import Judged
 
 
 def series_of_failure(taken: Taken, failure: DataError) -> CalibrationSeries:

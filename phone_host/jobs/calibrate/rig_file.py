@@ -1,7 +1,6 @@
 """rig.yaml as phone-host calibrate writes it: what an earlier one holds, and the new one does not, is moved aside."""
 
 from pathlib import Path
-from typing import Final
 
 from common.errors import DataError, UnavailableError
 from common.places import Kind, kind_of
@@ -10,8 +9,6 @@ from phone_host.model import Rectification, Rig
 from phone_host.output.atomic import replacing
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import is_rig, read_rig, read_rig_views, write_rig
-
-REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
 
 
 def replace_rig(
@@ -54,11 +51,6 @@ def require_own(out: Path) -> None:
     """
     if kind_of(out) is not Kind.MISSING and not is_rig(out):
         raise UnavailableError(f"{out} is not a calibration, and would be replaced", "name another --out")
-
-
-def earlier_words(name: str) -> str:
-    """Say what the earlier rig is called now, behind a sentence on the new one that was written; empty if it was not moved."""
-    return f"; the earlier one is now {name}" if name else ""
 
 
 def _is_rejected(path: Path) -> bool:

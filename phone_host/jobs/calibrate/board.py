@@ -1,7 +1,6 @@
 """The board of phone-host calibrate: named by the user and checked in the images, or found in them."""
 
 from dataclasses import dataclass
-from enum import Enum
 from typing import Final
 
 from common.errors import DataError
@@ -9,8 +8,7 @@ from common.imagesize.head import size_text
 from phone_host.calibration.target.board_names import named_board, no_square
 from phone_host.calibration.target.board_size import require_marks_of, require_size, size_in_files
 from phone_host.calibration.target.corners import Board
-from phone_host.calibration.target.marked import Charuco
-from phone_host.jobs.units import square_mm
+from phone_host.report.calibration_report import Known, Origin
 from phone_host.run.progress_bar import busy_bar
 from phone_host.stereo.view_files import ViewFiles
 
@@ -26,21 +24,6 @@ _COUNT_MARKS: Final = (
 )
 
 
-class Origin(Enum):
-    """Who says how many corners the board has."""
-
-    OPTION = "option"
-    IMAGES = "images"
-    EARLIER = "earlier calibration"
-
-
-_SAID: Final = {
-    Origin.OPTION: "as --board says",
-    Origin.IMAGES: "as found in the images",
-    Origin.EARLIER: "as in the earlier calibration",
-}
-
-
 @dataclass(frozen=True, slots=True)
 class Named:
     """What the options say of the board.
@@ -54,41 +37,22 @@ class Named:
     square_mm: float
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
-    """The board, and who said its size."""
-
-    board: Board
-    origin: Origin
-
-    def as_line(self) -> str:
-        """Return it for the summary."""
-        marks = self.board.marks
-        kind = "" if marks is None else "ChArUco board of " if isinstance(marks, Charuco) else "AprilGrid of "
-        what = "inner corners" if marks is None else "corners"
-        size = size_text((self.board.columns, self.board.rows))
-        legacy = isinstance(marks, Charuco) and marks.is_legacy
-        arrangement = ", marks arranged as by OpenCV before 4.6 and calib.io" if legacy else ""
-        return f"board    {kind}{size} {what}, {_SAID[self.origin]}{arrangement}; squares of {self.board.square_m * 1e3:g} mm"
-
-
-def named(board: str, square: str | None) -> Named:
+def named(board: str, square_mm: float | None) -> Named:
     """Read --board and --square.
 
     Args:
         board: "auto", inner corners such as "9x6", or the name of a board with marks.
-        square: side of one square with its unit; None: not given.
+        square_mm: side of one square, mm; None: not given.
 
     Raises:
         SettingsError: one of the two is not valid, or a chessboard has no square.
     """
-    side_mm = None if square is None else square_mm(square)
     if board.strip().lower() == AUTO:
-        if side_mm is None:
+        if square_mm is None:
             raise no_square()
-        Board(3, 3, side_mm / 1000)  # refuses a square that no board has before images are read
-        return Named(None, side_mm)
-    known = named_board(board, side_mm)
+        Board(3, 3, square_mm / 1000)  # refuses a square that no board has before images are read
+        return Named(None, square_mm)
+    known = named_board(board, square_mm)
     return Named(known, known.square_m * 1e3)
 
 

@@ -1,6 +1,5 @@
 """phone-host calibrate --from: what an earlier calibration gives to a new one."""
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,19 +11,19 @@ from phone_host.calibration.solve.calibrate import Sizes, calibrate, solve_pose
 from phone_host.calibration.solve.earlier_views import board_of, new_ones, pairs_of, together, views_of
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.target.board_names import board_name, named_board
-from phone_host.calibration.target.board_views import Mounted
 from phone_host.calibration.target.cameras_beside import first_sizes
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair
-from phone_host.jobs.units import square_mm
+from phone_host.jobs.calibrate.board import AUTO, Named, named
+from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.model import CameraModel, Rig, Side
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig_views
+from phone_host.report.calibration_report import Known, Origin
 from phone_host.settings import most_pixels
 from phone_host.stereo.scaled_rig import is_scaling, scaled_rig
 from phone_host.stereo.view_files import ViewFiles
-from phone_host.verbs.calibrate.board import AUTO, Known, Named, Origin, named
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +47,7 @@ class Series:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """What the options ask for, with what the earlier calibration says.
+    """What is asked for, with what the earlier calibration says.
 
     Attributes:
         named: the board.
@@ -61,35 +60,35 @@ class Asked:
     views: RigViews | None = None
 
 
-def asked_of(options: argparse.Namespace) -> Asked:
-    """Read --board and --square, and the earlier calibration if there is one.
+def asked_of(request: CalibrateRequest) -> Asked:
+    """Return the board that is asked for, and the earlier calibration if there is one.
 
     Raises:
         SettingsError: one of them is missing, not valid, or contradicts the earlier calibration.
         DataError: the earlier calibration cannot be read or added to.
     """
-    if options.earlier is None:
-        if options.pose_only:
+    if request.earlier is None:
+        if request.pose_only:
             raise SettingsError("--pose-only keeps the lenses of an earlier calibration", "name it: --from rig.yaml")
-        return Asked(named=named(options.board or AUTO, options.square))
-    rig, views = read_own_rig(options.earlier), read_rig_views(options.earlier)
-    if views is None and not options.pose_only:
+        return Asked(named=named(request.board or AUTO, request.square_mm))
+    rig, views = read_own_rig(request.earlier), read_rig_views(request.earlier)
+    if views is None and not request.pose_only:
         raise DataError(
-            f"{options.earlier} does not hold the corners it was computed from",
+            f"{request.earlier} does not hold the corners it was computed from",
             "calibrate from all pictures together, or give --pose-only to keep its lenses",
         )
-    asked = named(options.board or AUTO, options.square) if views is None else _named_again(options, board_of(views))
+    asked = named(request.board or AUTO, request.square_mm) if views is None else _named_again(request, board_of(views))
     return Asked(named=asked, rig=rig, views=views)
 
 
-def _named_again(options: argparse.Namespace, before: Board) -> Named:
+def _named_again(request: CalibrateRequest, before: Board) -> Named:
     """Return the board, where what is not said is as it was."""
-    text = (options.board or AUTO).strip()
-    if options.pose_only and options.square is not None:
-        return named(text, options.square)
-    side_mm = _mm(before) if options.square is None else square_mm(options.square)
+    text = (request.board or AUTO).strip()
+    if request.pose_only and request.square_mm is not None:
+        return named(text, request.square_mm)
+    side_mm = _mm(before) if request.square_mm is None else request.square_mm
     given = before if text.lower() == AUTO else named_board(text, side_mm)
-    if options.pose_only and board_name(given) != board_name(before):
+    if request.pose_only and board_name(given) != board_name(before):
         return named(text, None)  # another board has a square of its own
     for option, now, earlier in (
         ("--board", board_name(replace(given, square_m=before.square_m)), board_name(before)),
@@ -97,7 +96,7 @@ def _named_again(options: argparse.Namespace, before: Board) -> Named:
     ):
         if now != earlier:
             raise SettingsError(
-                f"{option} says {now}, and the pictures of {options.earlier} show {earlier}",
+                f"{option} says {now}, and the pictures of {request.earlier} show {earlier}",
                 f"leave {option} out and show the same board, or calibrate without --from",
             )
     return Named(before, _mm(before))
@@ -107,40 +106,40 @@ def _mm(board: Board) -> float:
     return board.square_m * 1e3
 
 
-def series_of(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Known]) -> tuple[Series, Known]:
+def series_of(request: CalibrateRequest, asked: Asked, find: Callable[[Named], Known]) -> tuple[Series, Known]:
     """Find the board, and join what is known of the earlier calibration.
 
     Args:
-        options: the command's.
-        asked: what they say.
+        request: of the calibration.
+        asked: what it says.
         find: finds a board in the new pictures, or checks it there.
 
     Raises:
         SettingsError: an option contradicts the pictures.
         DataError: the pictures show no board, or another one than the earlier ones.
     """
-    known = find(asked.named) if asked.views is None else _known(options, asked, find)
+    known = find(asked.named) if asked.views is None else _known(request, asked, find)
     if asked.rig is None:
-        return Series(board=known.board, side=Side(options.board_side or Side.LEFT.value), path=Path()), known
+        return Series(board=known.board, side=request.board_side or Side.LEFT, path=Path()), known
     series = Series(
         board=known.board,
-        side=Side(options.board_side or asked.rig.board_side.value),
-        path=options.earlier,
+        side=request.board_side or asked.rig.board_side,
+        path=request.earlier or Path(),
         rig=asked.rig,
-        views=None if options.pose_only else asked.views,
+        views=None if request.pose_only else asked.views,
     )
     return series, known
 
 
-def _known(options: argparse.Namespace, asked: Asked, find: Callable[[Named], Known]) -> Known:
+def _known(request: CalibrateRequest, asked: Asked, find: Callable[[Named], Known]) -> Known:
     """Find the board; one that is not named is that of the earlier calibration."""
-    if options.board is not None or options.square is not None:
+    if request.board is not None or request.square_mm is not None:
         return find(asked.named)
     try:
         return replace(find(asked.named), origin=Origin.EARLIER)
     except SettingsError as error:
         raise DataError(
-            f"the new pictures show another board than {options.earlier} holds",
+            f"the new pictures show another board than {request.earlier} holds",
             "show the same board, or calibrate without --from",
         ) from error
 
@@ -213,7 +212,7 @@ def notes(series: Series, pairs: list[BoardPair], sizes_px: Sizes) -> list[str]:
     return rows
 
 
-def require_first_sizes(files: ViewFiles, asked: Asked, options: argparse.Namespace, mounted: Mounted) -> None:
+def require_first_sizes(files: ViewFiles, asked: Asked, request: CalibrateRequest) -> None:
     """Check the size of the first pictures before all of them are searched for a board.
 
     Raises:
@@ -221,13 +220,13 @@ def require_first_sizes(files: ViewFiles, asked: Asked, options: argparse.Namesp
     """
     if asked.rig is None:
         return
-    sizes_px = first_sizes(files, most_pixels(None, options.max_megapixels), mounted)
+    sizes_px = first_sizes(files, most_pixels(None, request.pictures.max_megapixels), request.pictures.mounted)
     if sizes_px is None:
         return
-    if options.pose_only:
+    if request.pose_only:
         scaled_rig(asked.rig, *sizes_px)
     else:
-        _require_sizes(asked.rig, options.earlier, sizes_px)
+        _require_sizes(asked.rig, request.earlier or Path(), sizes_px)
 
 
 def _require_sizes(rig: Rig, path: Path, sizes_px: Sizes) -> None:

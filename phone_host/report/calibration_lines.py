@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from phone_host.calibration.target.board_views import BoardViews, turn_text
 from phone_host.calibration.target.pairs import Rejected
 from phone_host.model import Verdict
 from phone_host.output.report_owner import REPORT
+from phone_host.report.calibration_report import CalibrationReport, Judged
 from phone_host.stereo.view_files import ViewFiles, is_unread_photograph
-from phone_host.verbs.calibrate.report import CalibrationReport, Judged
-from phone_host.verbs.calibrate.rig_file import REFUSED, earlier_words
+
+REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
 
 _SHOWN = 3
 _WHOLE_METRES = 10.0
@@ -163,3 +165,8 @@ def _written(report: CalibrationReport, out: Path) -> list[str]:
     if report.verdict is Verdict.REJECT:
         rows.append(REFUSED)
     return rows
+
+
+def earlier_words(name: str) -> str:
+    """Say what the earlier rig is called now, behind a sentence on the new one that was written; empty if it was not moved."""
+    return f"; the earlier one is now {name}" if name else ""

@@ -2,14 +2,19 @@
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
+from typing import Final
 
 from common.diagnostic import Diagnostic
 from common.errors import DataError
+from common.imagesize.head import size_text
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.solve.verdict import Assessment
 from phone_host.calibration.target.board_views import BoardViews
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.marked import Charuco
 from phone_host.calibration.target.pairs import Rejected
 from phone_host.declared_settings import NEAR_M
 from phone_host.model import Verdict
@@ -18,7 +23,39 @@ from phone_host.stereo.depth_limits import DepthWanted, depth_limits, disparity_
 from phone_host.stereo.reproject import disparities_for_near
 from phone_host.stereo.view_files import ViewFiles
 from phone_host.stereo.working import chosen_scale
-from phone_host.verbs.calibrate.board import Known
+
+
+class Origin(Enum):
+    """Who says how many corners the board has."""
+
+    OPTION = "option"
+    IMAGES = "images"
+    EARLIER = "earlier calibration"
+
+
+_SAID: Final = {
+    Origin.OPTION: "as --board says",
+    Origin.IMAGES: "as found in the images",
+    Origin.EARLIER: "as in the earlier calibration",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """The board, and who said its size."""
+
+    board: Board
+    origin: Origin
+
+    def as_line(self) -> str:
+        """Return it for the summary."""
+        marks = self.board.marks
+        kind = "" if marks is None else "ChArUco board of " if isinstance(marks, Charuco) else "AprilGrid of "
+        what = "inner corners" if marks is None else "corners"
+        size = size_text((self.board.columns, self.board.rows))
+        legacy = isinstance(marks, Charuco) and marks.is_legacy
+        arrangement = ", marks arranged as by OpenCV before 4.6 and calib.io" if legacy else ""
+        return f"board    {kind}{size} {what}, {_SAID[self.origin]}{arrangement}; squares of {self.board.square_m * 1e3:g} mm"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,6 @@
 """phone-host calibrate --live: takes the views with both cameras, guides the person, then leaves the pictures to `calibrate`."""
 
-import argparse
 import logging
-import math
 import shlex
 import sys
 from collections.abc import Callable, Sequence
@@ -15,7 +13,6 @@ from common import now
 from common.errors import DataError, SettingsError
 from common.orientation import UPRIGHT
 from common.program import logs
-from common.program.request import read_request
 from common.program.settings import log_level
 from common.program.signals import StopSignals
 from common.program.terminal import say
@@ -23,6 +20,7 @@ from common.stamp import HOST_CLOCK
 from common.words import counted
 from phone_host.calibration.failure_modes.mistakes import Mistake
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
+from phone_host.calibration.failure_modes.remedies import arrangement_hint, assessed
 from phone_host.calibration.guide.gates import View
 from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
 from phone_host.calibration.guide.snapshot import GuideSnapshot
@@ -37,10 +35,10 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.discovery.opened import open_named
-from phone_host.jobs.options import ImageOptions
+from phone_host.jobs.calibrate.earlier import Asked, Series, calibrated, every_pair
+from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.output_folders import require_folder, unwritable
 from phone_host.jobs.picture_pairs import VIEWS
-from phone_host.jobs.units import baseline_mm
 from phone_host.live.calibration import LiveCalibration, LiveSettings
 from phone_host.live.calibration_view import Lines, Picture, Shows, SnapshotFiles, Spoken, tell_sides
 from phone_host.live.voice import Voice, speech_program
@@ -49,10 +47,6 @@ from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import Sink
 from phone_host.settings import key_folder, most_pixels
 from phone_host.sync.phase import Whose
-from phone_host.verbs.calibrate.cause import assessed
-from phone_host.verbs.calibrate.earlier import Asked, Series, calibrated, every_pair
-from phone_host.verbs.calibrate.given import command_again
-from phone_host.verbs.calibrate.hints import arrangement_hint
 
 _LOG = logging.getLogger(__name__)
 
@@ -93,15 +87,15 @@ class Live:
         """Both folders, as LEFT and RIGHT."""
         return str(self.left), str(self.right)
 
-    def as_lines(self, options: argparse.Namespace) -> list[str]:
+    def as_lines(self, request: CalibrateRequest) -> list[str]:
         """Return it for the summary: where the pictures are, and how they are calibrated again."""
         taken = f"live     {counted(self.last.views, 'view')} in {self.last.seconds:.0f} s"
-        command = command_again(options, *self.folders)
+        command = request.again(*self.folders)
         again = [f"{taken}; to calibrate from them again:", f"         {command}"] if command else [taken]
         if self.last.verdict != Verdict.GOOD.value:
             return again
-        links = [word for uri in options.link or () for word in ("--link", uri)]
-        run = ["phone-host", "run", *links, "--camera", options.camera, "--calibration", str(options.out)]
+        links = [word for uri in request.cameras.link or () for word in ("--link", uri)]
+        run = ["phone-host", "run", *links, "--camera", request.cameras.camera or "", "--calibration", str(request.out)]
         return [*again, f"next     {shlex.join(run)}"]
 
 
@@ -172,13 +166,13 @@ class PreparedViews:
 
 
 def prepare_views(
-    options: argparse.Namespace, asked: Asked, feed: BrowserFeed | None = None, sinks: Sequence[Sink] = ()
+    request: CalibrateRequest, asked: Asked, feed: BrowserFeed | None = None, sinks: Sequence[Sink] = ()
 ) -> PreparedViews:
     """Open everything that a live calibration needs.
 
     Args:
-        options: the command's.
-        asked: what they ask for, with what the earlier calibration says.
+        request: of the calibration.
+        asked: what it asks for, with what the earlier calibration says.
         feed: brings browsers that give their cameras; None: there is no page.
         sinks: for who wants to see the pictures.
 
@@ -186,28 +180,30 @@ def prepare_views(
         SettingsError: an option is missing or not valid.
         UnavailableError: the board, the camera or a folder cannot be had.
     """
-    _check(options)
-    settings = _settings(options, asked)
-    for folder in (settings.left, settings.right, options.snapshots):
+    uri = request.cameras.camera
+    if not uri:
+        raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
+    _check(request)
+    settings = _settings(request, asked)
+    for folder in (settings.left, settings.right, request.snapshots):
         if folder is not None:
             require_folder(folder)
-    baseline_m = math.nan if options.baseline is None else baseline_mm(options.baseline) / 1000
 
     def grow(views: tuple[View, ...], board: Board, sizes_px: tuple[Size, Size]) -> Progress:
         series = Series(
             board=board,
             side=settings.host.board_side,
-            path=options.earlier or Path(),
+            path=request.earlier or Path(),
             rig=asked.rig,
-            views=None if options.pose_only else asked.views,
+            views=None if request.pose_only else asked.views,
         )
-        return grown(views, series, sizes_px, baseline_m)
+        return grown(views, series, sizes_px, request.measured_m)
 
     with ExitStack() as opened:  # what cannot be had closes what was
-        camera = open_camera(options.camera, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels, feed)
+        camera = open_camera(uri, HOST_CLOCK, now.monotonic_ns(), settings.host.most_pixels, feed)
         opened.enter_context(closing(camera))
-        keys = key_folder(options.keys or "")
-        named, links = open_named(options.link or (), keys, options.wait)
+        keys = key_folder(request.cameras.keys or "")
+        named, links = open_named(request.cameras.link or (), keys, request.cameras.wait_s)
         for link in links:
             opened.enter_context(closing(link))
         try:
@@ -215,15 +211,15 @@ def prepare_views(
         except OSError as error:
             raise unwritable(settings.left, error, "LEFT or --snapshots") from error
         opened.pop_all()
-    return PreparedViews(live, named, settings.left, settings.right, _least_views(options))
+    return PreparedViews(live, named, settings.left, settings.right, _least_views(request))
 
 
-def take_views(options: argparse.Namespace, asked: Asked) -> Live:
+def take_views(request: CalibrateRequest, asked: Asked) -> Live:
     """Take views until it is enough.
 
     Args:
-        options: the command's.
-        asked: what they ask for, with what the earlier calibration says.
+        request: of the calibration.
+        asked: what it asks for, with what the earlier calibration says.
 
     Raises:
         SettingsError: an option is missing or not valid, or the person shows another board.
@@ -231,9 +227,9 @@ def take_views(options: argparse.Namespace, asked: Asked) -> Live:
         DataError: too few views were taken to calibrate from.
     """
     logs.set_up(log_level("error"))  # doubts about pairs are the gates' business
-    prepared = prepare_views(options, asked)
+    prepared = prepare_views(request, asked)
     signals = StopSignals()
-    _run(prepared, options, signals)
+    _run(prepared, request, signals)
     try:
         return prepared.taken(signals)
     except DataError as reason:
@@ -284,49 +280,47 @@ def grown(views: tuple[View, ...], series: Series, sizes_px: tuple[Size, Size], 
     )
 
 
-def _check(options: argparse.Namespace) -> None:
-    if not options.camera:
-        raise SettingsError("no camera of this machine is given", f"use --camera {EXAMPLE}")
-    least = _least_views(options)
-    if not least <= options.views <= _MOST_VIEWS:
-        raise SettingsError(f"--views is {options.views}", f"give {least} to {_MOST_VIEWS}")
-    if len(options.images) not in {0, 2}:
+def _check(request: CalibrateRequest) -> None:
+    least = _least_views(request)
+    if not least <= request.most_views <= _MOST_VIEWS:
+        raise SettingsError(f"--views is {request.most_views}", f"give {least} to {_MOST_VIEWS}")
+    if len(request.images) not in {0, 2}:
         raise SettingsError(
-            f"--live with {counted(len(options.images), 'folder')}",
+            f"--live with {counted(len(request.images), 'folder')}",
             "name two folders for the pictures it takes, or none",
         )
-    if read_request(ImageOptions, vars(options)).mounted != (UPRIGHT, UPRIGHT):
+    if request.pictures.mounted != (UPRIGHT, UPRIGHT):
         raise SettingsError(
             "--live does not take --rotate-left, --rotate-right, --flip-left or --flip-right",
             "add rotate= or flip= to the camera's address",
         )
 
 
-def _least_views(options: argparse.Namespace) -> int:
+def _least_views(request: CalibrateRequest) -> int:
     """Return how many views there must be for a rig to know how exact it is."""
-    return LEAST_STATED if options.earlier is None else _LEAST_ADDED
+    return LEAST_STATED if request.earlier is None else _LEAST_ADDED
 
 
-def _settings(options: argparse.Namespace, asked: Asked) -> LiveSettings:
+def _settings(request: CalibrateRequest, asked: Asked) -> LiveSettings:
     rig = asked.rig
-    side = Side(options.board_side) if options.board_side else Side.LEFT if rig is None else rig.board_side
-    beside = options.out.parent / VIEWS
-    left, right = map(Path, options.images) if options.images else (beside / "left", beside / "right")
+    side = request.board_side or (Side.LEFT if rig is None else rig.board_side)
+    beside = request.out.parent / VIEWS
+    left, right = map(Path, request.images) if request.images else (beside / "left", beside / "right")
     return LiveSettings(
         host=HostSettings(
             board_side=side,
-            tolerance_ns=round(options.tolerance * 1e6) if options.tolerance else None,
-            wait_ns=None if options.wait is None else round(options.wait * 1e9),
+            tolerance_ns=round(request.cameras.tolerance_ms * 1e6) if request.cameras.tolerance_ms else None,
+            wait_ns=None if request.cameras.wait_s is None else round(request.cameras.wait_s * 1e9),
             time_offset=TimeOffset() if rig is None else rig.time_offset,
-            most_pixels=most_pixels(None, options.max_megapixels),
+            most_pixels=most_pixels(None, request.pictures.max_megapixels),
             steered=frozenset(Whose),  # a view is worth as much as its two exposures are simultaneous
         ),
         board=asked.named.board,
         square_m=asked.named.square_mm / 1000,
-        most_views=options.views,
+        most_views=request.most_views,
         left=left,
         right=right,
-        seen=_seen_before(asked, pose_only=options.pose_only),
+        seen=_seen_before(asked, pose_only=request.pose_only),
     )
 
 
@@ -339,20 +333,20 @@ def _seen_before(asked: Asked, *, pose_only: bool) -> frozenset[Want]:
     return CORNERS - unseen_in(pairs_of(asked.views), board_of(asked.views), asked.rig.left, asked.rig.right)
 
 
-def _run(prepared: PreparedViews, options: argparse.Namespace, signals: StopSignals) -> None:
+def _run(prepared: PreparedViews, request: CalibrateRequest, signals: StopSignals) -> None:
     """Run it before all presenters that are wanted."""
-    command = speech_program() if options.sound else ()
+    command = speech_program() if request.sound else ()
     is_terminal = sys.stderr.isatty()
     with ExitStack() as ending:
         shows: list[Shows] = []
-        picture = Picture(rings=options.sound and not command)
+        picture = Picture(rings=request.sound and not command)
         if command:
             voice = Voice(command, lambda reason: ring_instead(picture, command[0], reason))
             ending.callback(voice.finish)
             shows.append(Spoken(voice.say))
-        if options.snapshots is not None:
+        if request.snapshots is not None:
             try:
-                shows.append(SnapshotFiles(options.snapshots))
+                shows.append(SnapshotFiles(request.snapshots))
             except OSError as error:
                 raise unwritable(prepared.left, error, "LEFT or --snapshots") from error
         if is_terminal:

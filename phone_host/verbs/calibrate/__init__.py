@@ -1,1 +1,0 @@
-"""phone-host calibrate: its options (light), and its command."""
