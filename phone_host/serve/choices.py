@@ -38,7 +38,7 @@ _OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object", "unseen")
 """Options of `scan` that the page may give."""
 
 
-class StrictParser(ExamplesFirstParser):
+class _StrictParser(ExamplesFirstParser):
     """A parser that raises what it would print."""
 
     def __init__(self) -> None:
@@ -53,8 +53,8 @@ class StrictParser(ExamplesFirstParser):
         )
 
 
-def _parser(kind: type) -> StrictParser:
-    made = StrictParser()
+def _parser(kind: type) -> _StrictParser:
+    made = _StrictParser()
     add_options(made, kind)
     return made
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Final
 
 from common import now
-from common.diagnostic import Diagnostic
-from common.errors import SettingsError
+from common.diagnostic import Diagnostic, Severity, diagnostic_of
+from common.errors import DataError, SettingsError
 from common.keys import KeyFolder
 from common.program.extensions import registered_names
 from common.program.invocation import command_line
@@ -20,13 +20,16 @@ from phone_host.camera.http_uri import without_password
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question
+from phone_host.jobs.calibrate.earlier import Asked, asked_of
+from phone_host.jobs.calibrate.live import PreparedViews, prepare_views
+from phone_host.jobs.calibrate.pictures import calibrate_pictures, require_rig_place
+from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.run import PreparedRun, open_run
 from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.jobs.scan import PreparedScan, SinksOf, prepare_scan
 from phone_host.jobs.scan_request import ScanRequest, axes_beside
 from phone_host.jobs.stereo_core import refuse_rejected
-from phone_host.live.calibration import LiveCalibration
-from phone_host.live.calibration_view import Shows
+from phone_host.model import Verdict
 from phone_host.output.axes import Axes
 from phone_host.output.calib_txt import is_calib_txt
 from phone_host.output.data_folder import data_folder
@@ -80,22 +83,40 @@ class Calibrated:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ReadyCalibration:
+class Calibration:
     """A live calibration that is ready to begin.
 
     Attributes:
-        live: takes the views.
-        run: takes views until it is enough, or until it shall stop; presenters show how it goes.
-        finish: calibrates from the views, and writes what came of it, unless what it calls before that raises.
+        request: what is asked for.
+        asked: what it says of the board and of an earlier calibration.
+        views: takes the pictures.
     """
 
-    live: LiveCalibration
-    run: Callable[[Callable[[], bool], Sequence[Shows]], None]
-    finish: Callable[[Callable[[], None]], Calibrated]
+    request: CalibrateRequest
+    asked: Asked
+    views: PreparedViews
+
+    def finish(self, may_write: Callable[[], None]) -> Calibrated:
+        """Calibrate from the views, and write what came of it.
+
+        Args:
+            may_write: raises if nothing shall be written.
+        """
+        out = self.request.out
+        report = calibrate_pictures(self.request, self.asked, self.views.taken(_Nobody()), may_write).report
+        if isinstance(report.result, DataError):
+            trouble = diagnostic_of(report.result)
+            return Calibrated(f"no calibration: {trouble.message}", trouble)
+        words = f"verdict {report.verdict.value}: {out}"
+        if report.verdict is Verdict.REJECT:
+            return Calibrated(words, Diagnostic("the calibration is rejected", report.remedy, Severity.FAIL))
+        return Calibrated(words, rig=out.absolute())
 
 
-Calibrate = Callable[[Sequence[str], BrowserFeed, Sequence[Sink]], ReadyCalibration]
-"""Opens a live calibration by the words of `calibrate`."""
+class _Nobody:
+    """Nobody wants the end of it all: the page's stop does not come this far."""
+
+    interrupted = False
 
 
 class Commands:
@@ -229,19 +250,22 @@ class Commands:
         calibration = Path(question.calibration) if question.calibration else None
         return check_capture(camera, calibration, question.data, _CAPTURE_S, stopped=stopped, tell=tell).findings
 
-    def calibration_words(self, choices: Choices, values: Choices) -> list[str]:
-        """Return the words of a live `calibrate`.
+    def calibration(self, choices: Choices, values: Choices, sinks: Sequence[Sink]) -> Calibration:
+        """Open everything that a live calibration needs.
 
         Args:
             choices: of a run.
             values: options of `calibrate` by name.
+            sinks: take its pairs.
         """
         given = {name: value for name, value in without_depth(choices).items() if name != "fifo"}
         given |= {name: values[name] for name in _OF_CALIBRATION if values.get(name)}
         given |= {name: value for name, value in self._fixed.items() if name == "keys"}
-        given["out"] = placed(values.get("out", "")) or str(data_folder() / _RIG)
-        links = [word for link in given.pop("link", "").split() for word in ("--link", link)]
-        return ["--live", "--no-sound", *links, *(word for name in given for word in (f"--{name}", given[name]))]
+        given |= {"live": "yes", "no-sound": "yes", "out": placed(values.get("out", "")) or str(data_folder() / _RIG)}
+        request = request_of(given, CalibrateRequest)
+        asked = asked_of(request)
+        require_rig_place(request.out)
+        return Calibration(request, asked, prepare_views(request, asked, self.feed, sinks))
 
     def print_wanted(self, values: Choices) -> PrintWanted:
         """Return how these options of `print`, printer and bed, want a scan printed. Nothing is opened."""

@@ -29,7 +29,7 @@ from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task
 from phone_host.serve.capture_guide import CaptureGuide
 from phone_host.serve.choices import Choices
-from phone_host.serve.commands import Calibrate, Commands
+from phone_host.serve.commands import Commands
 from phone_host.serve.memory import Memory
 from phone_host.serve.places import page_folder
 from phone_host.serve.point_answer import answered
@@ -69,11 +69,10 @@ class Station:
 
     Args:
         commands: what is chosen, and the jobs that are begun with it.
-        calibrate: opens a live calibration.
     """
 
-    def __init__(self, commands: Commands, calibrate: Calibrate) -> None:
-        self._commands, self._opened_calibration = commands, calibrate
+    def __init__(self, commands: Commands) -> None:
+        self._commands = commands
         self._shelf = Shelf()
         kept = commands.kept
         self._memory = Memory(kept)
@@ -298,16 +297,15 @@ class Station:
         choices = self._both_chosen()
 
         def work(task: Task) -> None:
-            words = self._commands.calibration_words(choices, values)
-            ready = self._opened_calibration(words, self.feed, self._sinks(None))
+            ready = self._commands.calibration(choices, values, self._sinks(None))
             shown = SnapshotValues(self._show_guide)
             try:
-                with task.held(), self._memory.live(ready.live.host.snapshot):
-                    ready.run(task.stopped, (shown,))
+                with task.held(), self._memory.live(ready.views.live.host.snapshot):
+                    ready.views.run(task.stopped, (shown,))
             finally:
                 self._shelf.clear()  # these pairs are not those of a run
             if task.stopped():
-                views = counted(ready.live.snapshot().views, "view")
+                views = counted(ready.views.live.snapshot().views, "view")
                 self._memory.calibration_stopped(f"stopped: {views} saved, no calibration computed")
                 return
             done = ready.finish(task.go_on)

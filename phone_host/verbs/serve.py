@@ -2,34 +2,25 @@
 
 import select
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TextIO
 
-from common.diagnostic import Diagnostic, Severity, diagnostic_of
-from common.errors import DataError, TakenError
+from common.errors import TakenError
 from common.plain_text import printable
 from common.program import logs
 from common.program.commandline import INTERRUPTED
 from common.program.interrupts import leave
-from common.program.request import Request, add_options, option, read_request
+from common.program.request import Request, option
 from common.program.signals import StopSignals
 from common.program.terminal import columns, say
 from common.words import counted
-from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.headline import headline
-from phone_host.jobs.calibrate.earlier import asked_of
-from phone_host.jobs.calibrate.live import prepare_views
-from phone_host.jobs.calibrate.pictures import calibrate_pictures, require_rig_place
-from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.options import LAN_HELP
-from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
-from phone_host.run.sinks import Sink
-from phone_host.serve.choices import StrictParser
-from phone_host.serve.commands import Calibrated, Commands, ReadyCalibration
+from phone_host.serve.commands import Commands
 from phone_host.serve.page import first_url, open_browser, page_settings, served, tell_page
 from phone_host.serve.station import Station
 from phone_host.settings import usual_file
@@ -82,7 +73,7 @@ def run(request: ServeRequest) -> int:
     )
     logs.set_up(commands.log_level)
     settings = page_settings(request.address, commands.keys.path, lan=request.lan)
-    station = Station(commands, live_calibration)
+    station = Station(commands)
     signals = StopSignals()
     with _opened_if_taken(settings, is_asked=request.open), served(station, settings) as server:
         url = first_url(server, settings)
@@ -110,43 +101,6 @@ def _opened_if_taken(settings: PageSettings, *, is_asked: bool) -> Iterator[None
             scheme = "http" if settings.credentials is None else "https"
             open_browser(f"{scheme}://127.0.0.1:{settings.port}/")
         raise
-
-
-def live_calibration(words: Sequence[str], feed: BrowserFeed, sinks: Sequence[Sink]) -> ReadyCalibration:
-    """Open everything that a live calibration needs.
-
-    Args:
-        words: of `calibrate`.
-        feed: brings browsers that give their cameras.
-        sinks: for who wants to see the pictures.
-
-    Raises:
-        TandemError: as `prepare_views` and `require_rig_place`.
-    """
-    parser = StrictParser()
-    add_options(parser, CalibrateRequest)
-    request = read_request(CalibrateRequest, vars(parser.parse_args(list(words))))
-    asked = asked_of(request)
-    require_rig_place(request.out)
-    views = prepare_views(request, asked, feed, sinks)
-
-    def finish(may_write: Callable[[], None]) -> Calibrated:
-        report = calibrate_pictures(request, asked, views.taken(_Nobody()), may_write).report
-        if isinstance(report.result, DataError):
-            trouble = diagnostic_of(report.result)
-            return Calibrated(f"no calibration: {trouble.message}", trouble)
-        words = f"verdict {report.verdict.value}: {request.out}"
-        if report.verdict is Verdict.REJECT:
-            return Calibrated(words, Diagnostic("the calibration is rejected", report.remedy, Severity.FAIL))
-        return Calibrated(words, rig=request.out.absolute())
-
-    return ReadyCalibration(views.live, views.run, finish)
-
-
-class _Nobody:
-    """Nobody wants the end of it all: the page's stop does not come this far."""
-
-    interrupted = False
 
 
 def told(state: PageState) -> str:

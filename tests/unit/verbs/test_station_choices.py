@@ -10,7 +10,6 @@ from common.errors import SettingsError
 from phone_host.serve.commands import Commands
 from phone_host.serve.kept_choices import kept
 from phone_host.serve.station import Station
-from phone_host.verbs.serve import live_calibration
 from phone_host.web.source import Command, Do
 from tests.support.pictures import jpeg
 
@@ -22,7 +21,7 @@ def test_what_the_file_says_is_checked_at_the_start(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"host\.toml: 'banana' is no option"):
         Commands(file, keys, lambda _: None)
     file.write_text('camera = "replay:"\n')
-    station = Station(Commands(file, keys, lambda _: None), live_calibration)
+    station = Station(Commands(file, keys, lambda _: None))
     assert station.state().trouble == Diagnostic(
         "camera 'replay:' names no folder", "name one with images, for example replay:frames?fps=30", Severity.FAIL
     )
@@ -42,7 +41,7 @@ def test_what_the_file_says_is_checked_at_the_start(tmp_path: Path) -> None:
 def test_what_is_set_at_the_same_moment_is_all_kept(tmp_path: Path) -> None:
     """Several pages may set several things at once: none takes another's back, in memory or in the file."""
     file = tmp_path / "host.toml"
-    station = Station(Commands(file, str(tmp_path / "keys"), lambda _: None), live_calibration)
+    station = Station(Commands(file, str(tmp_path / "keys"), lambda _: None))
     wanted = {"pairs": "3", "seconds": "4", "save-every": "5", "tolerance": "6", "budget": "30ms", "axes": "y-up"}
     setting = [Command(do=Do.SET, values={name: value}) for name, value in wanted.items()]
     with ThreadPoolExecutor(len(setting)) as threads:
