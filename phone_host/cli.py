@@ -94,7 +94,7 @@ def _run(options: argparse.Namespace) -> int:
     from phone_host.output.folder_lock import command_locks  # noqa: PLC0415 - the help needs none
 
     run, kind = command_of(options.verb)
-    request = read_request(kind, vars(options))
+    request: Any = read_request(kind, vars(options))
     with interruptible(native=options.verb in _NATIVE), command_locks():
         return run(request)
 

@@ -14,12 +14,11 @@ from phone_host.output.axes import Axes
 from phone_host.run.host import Host
 from phone_host.serve.choices import Choices
 from phone_host.serve.memory import Memory
-from phone_host.serve.point_answer import answered
-from phone_host.serve.recordings import Recordings
-from phone_host.serve.shelf import PageSink, Shelf
-from phone_host.serve.snapshots import keep_newest
+from phone_host.serve.point_answer import ShelfSource
+from phone_host.serve.saved import Recordings, keep_newest
+from phone_host.serve.shelf import PageSink
 from phone_host.stereo.core import StereoCore
-from phone_host.web.source import Activity, Answer, Command, Do, Measured, Newest, PageState, Surface
+from phone_host.web.source import Activity, Answer, Command, Do, PageState, Surface
 
 _NEEDS_SERVE: Final = Diagnostic(
     "this page only shows a run that was started on the command line",
@@ -28,7 +27,7 @@ _NEEDS_SERVE: Final = Diagnostic(
 )
 
 
-class BesideRun:
+class BesideRun(ShelfSource):
     """The source behind the page of `run --serve`.
 
     Args:
@@ -42,9 +41,9 @@ class BesideRun:
     def __init__(
         self, choices: Choices, command: Callable[[Choices], str], *, snapshots: Path, recordings: Path, axes: Axes
     ) -> None:
+        super().__init__()
         self._command, self._snapshots, self._folder, self._axes = command, snapshots, recordings, axes
         self._recordings = Recordings()
-        self._shelf = Shelf()
         self._memory = Memory(choices)
         self.feed: Final = BrowserFeed(None)
         self._stop = threading.Event()
@@ -85,16 +84,8 @@ class BesideRun:
         if self._has_ended or self._stop.is_set():
             activity = Activity.IDLE if self._has_ended else Activity.ENDING
         choices = self._memory.choices
-        return replace(self._memory.state(activity, choices, self._command(choices)), steps=())
-
-    def newest(self) -> Newest | None:
-        """See Source."""
-        found = self._shelf.newest()
-        return None if found is None else found.newest
-
-    def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
-        """See Source."""
-        return self._shelf.subscribe(told)
+        known = PageState(activity=activity, settings=choices, command=self._command(choices))
+        return replace(self._memory.state(known), steps=())
 
     def command(self, command: Command) -> Answer:
         """See Source."""
@@ -117,10 +108,6 @@ class BesideRun:
             return Answer(trouble=diagnostic_of(error))
         finally:
             self._memory.outdate()
-
-    def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
-        """See Source."""
-        return answered(self._shelf, points_px, number)
 
     def saved(self) -> str:
         """See Source."""

@@ -1,15 +1,17 @@
-"""What a check of the two chosen cameras came to: what the doctor said, and what a run of some seconds without depth saw. Pure."""
+"""What a check of the two chosen cameras came to: what the doctor said, what a run of some seconds without depth saw, and how far a film is. Pure."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
 from common.diagnostic import Diagnostic, Severity
+from common.doctor.finding import ok
 from common.doctor.machine_checks import LOG_UNREADABLE
 from common.words import counted
 from phone_host.diagnostics.run_snapshot import RunSnapshot
-from phone_host.doctor.camera_check.words import CHECK_AGAIN
+from phone_host.doctor.camera_check.check import ENOUGH, Progress
+from phone_host.doctor.camera_check.words import CHECK_AGAIN, stage_words
 
 _OF_THE_CHOICE: Final = frozenset(
     {
@@ -31,6 +33,10 @@ _OF_THE_CHOICE: Final = frozenset(
 
 _OF_A_LINK: Final = {"serial": "serial:", "bluetooth": "rfcomm:"}
 """Findings that matter only to a link of this scheme."""
+
+
+_STEPS: Final = 20
+"""So often at the most the page is told how far a film is."""
 
 
 def relevant(findings: Iterable[Diagnostic], links: str) -> list[Diagnostic]:
@@ -98,3 +104,27 @@ def unseen(snapshot: RunSnapshot) -> Diagnostic:
         "give a greater tolerance, or the same frame rate",
         Severity.FAIL,
     )
+
+
+class CaptureGuide:
+    """Guides whoever holds the camera, no oftener than there is something new.
+
+    Args:
+        show: takes what the page shall show.
+    """
+
+    def __init__(self, show: Callable[[Sequence[Diagnostic]], None]) -> None:
+        self._show, self._shown = show, ("", -1, -1)
+
+    def wait(self) -> None:
+        """Say that the camera is waited for; a phone's may take seconds."""
+        self._show([ok("film", "waiting for the camera")])
+
+    def tell(self, progress: Progress) -> None:
+        """Take the progress; called with each frame."""
+        now = (stage_words(progress), int(progress.share * _STEPS), progress.told)
+        if now == self._shown:
+            return
+        self._shown = now
+        done = f"{100 * now[1] // _STEPS} % done, {min(progress.told, ENOUGH)} of {ENOUGH} segments were usable"
+        self._show([Diagnostic(now[0], done, Severity.OK, "film")])

@@ -47,7 +47,7 @@ from phone_host.serve.choices import (
     words_of,
 )
 from phone_host.serve.kept_choices import is_there, keep, kept
-from phone_host.serve.places import new_place, page_folder
+from phone_host.serve.saved import new_place, page_folder
 from phone_host.serve.workshop import PrintWanted, asked_print
 from phone_host.settings import chosen_keys
 from phone_host.stereo.matcher_names import MATCHERS

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Final
 
 from common import now
@@ -10,8 +11,8 @@ from common.diagnostic import Diagnostic
 from phone_host.calibration.guide.snapshot import Ended
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.serve.choices import Choices
-from phone_host.serve.steps import Facts, steps
-from phone_host.web.source import Activity, Choice, PageState, PrintState, ScanState
+from phone_host.serve.steps import steps
+from phone_host.web.source import Activity, Choice, PageState
 
 _FRESH_NS: Final = 150_000_000
 """A snapshot of a run serves so long: however often the state is asked for, the run is read a few times a second."""
@@ -39,7 +40,7 @@ class Memory:
         self._run: RunSnapshot | None = None
         self._read_ns = 0
         self._changed = 0
-        self._was: tuple[object, ...] = ()
+        self._was: PageState | None = None
         self.has_given_up = False
 
     @property
@@ -147,81 +148,35 @@ class Memory:
         with self._lock:
             self._run = None
 
-    def state(
-        self,
-        activity: Activity,
-        settings: Choices,
-        command: str,
-        *,
-        matchers: tuple[str, ...] = (),
-        stranger: str = "",
-        browser: Choice | None = None,
-        scan: ScanState | None = None,
-        scan_command: str = "",
-        printing: PrintState | None = None,
-    ) -> PageState:
+    def state(self, known: PageState, browser: Choice | None = None) -> PageState:
         """Return everything.
 
         Args:
-            activity: what goes on.
-            settings: the choices, as they may be shown.
-            command: the command line that does the same.
-            matchers: names of the matchers.
-            stranger: the chosen board that has to be enrolled first.
+            known: what others know: activity, choices as they may be shown, command lines, matchers, the stranger, scan and print.
             browser: the camera of whichever browser gives one; None: no browser can.
-            scan: the newest scan; None: there was none.
-            scan_command: the command line of a scan with these choices; empty: there is none.
-            printing: the newest print; None: there was none.
         """
         with self._lock:
-            run = self._fresh()
             same = self._checked[0] == _cameras_of(self._choices)
-            facts = Facts(
-                choices=settings,
-                stranger=stranger,
+            told = steps(
+                known.settings,
+                stranger=known.stranger,
                 checked=self._checked[1] if same else "",
                 pairs=self._pairs,
-                is_running=activity is Activity.RUNNING,
-                scan="" if scan is None else scan.words,
-                has_scan=scan is not None and bool(scan.folder),
+                is_running=known.activity is Activity.RUNNING,
+                scan="" if known.scan is None else known.scan.words,
+                has_scan=known.scan is not None and bool(known.scan.folder),
             )
-            told = steps(facts)
-            cameras = self._cameras if browser is None else (*(self._cameras or ()), browser)
-            here = (
-                activity,
-                told,
-                command,
-                scan_command,
-                settings,
-                self._boards,
-                cameras,
-                stranger,
-                self._checks,
-                self._trouble,
-                scan,
-                printing,
-            )
-            if here != self._was:
-                self._was, self._changed = here, self._changed + 1
-            return PageState(
-                activity=activity,
+            made = replace(
+                known,
                 steps=told,
-                command=command,
-                scan_command=scan_command,
-                settings=settings,
                 boards=self._boards,
-                cameras=cameras,
-                stranger=stranger,
-                matchers=matchers,
-                run=run,
-                guide=self._guide,
-                scan=scan,
-                printing=printing,
+                cameras=self._cameras if browser is None else (*(self._cameras or ()), browser),
                 checks=self._checks,
                 trouble=self._trouble,
-                changed=self._changed,
-                begun=self._begun,
             )
+            if made != self._was:
+                self._was, self._changed = made, self._changed + 1
+            return replace(made, run=self._fresh(), guide=self._guide, changed=self._changed, begun=self._begun)
 
     def _fresh(self) -> RunSnapshot | None:
         now_ns = now.monotonic_ns()

@@ -22,7 +22,7 @@ from phone_host.jobs.run_request import RunRequest
 from phone_host.output.axes import Axes
 from phone_host.serve.beside import BesideRun
 from phone_host.serve.choices import choices_of, shown_words
-from phone_host.serve.places import page_folder
+from phone_host.serve.saved import page_folder
 from phone_host.settings import key_folder
 from phone_host.web.invitation import by_cable, invitation, own_names
 from phone_host.web.secret_files import kept_credentials, kept_token

@@ -1,13 +1,13 @@
 """Answers a tap on the page: where that point lies, and how surely."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from phone_host.run.seen_pair import FoundPoint, Outcome, Point, seen_pair
 from phone_host.serve.shelf import Shelf, Shelved
 from phone_host.stereo.measured_point import SIGMAS_95, Within, distance_between
-from phone_host.web.source import Measured
+from phone_host.web.source import Measured, Newest
 
 _NO_DEPTH: Final = "this pair has no depth in metres: give a calibration, and run"
 _GONE: Final = "this pair is no longer in memory: tap again"
@@ -26,6 +26,26 @@ def answered(shelf: Shelf, points_px: Sequence[Point], number: int | None) -> Me
     if shelved is None:
         return _unmeasured(len(points_px), _NOTHING if number is None else _GONE)
     return _measured(shelved, points_px)
+
+
+class ShelfSource:
+    """What every source of the page answers from its shelf."""
+
+    def __init__(self) -> None:
+        self._shelf = Shelf()
+
+    def newest(self) -> Newest | None:
+        """See Source."""
+        found = self._shelf.newest()
+        return None if found is None else found.newest
+
+    def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
+        """See Source."""
+        return self._shelf.subscribe(told)
+
+    def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
+        """See Source."""
+        return answered(self._shelf, points_px, number)
 
 
 def _unmeasured(count: int, words: str) -> Measured:

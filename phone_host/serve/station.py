@@ -27,16 +27,13 @@ from phone_host.live.calibration_view import SnapshotValues
 from phone_host.run.freed_memory import give_back_freed_memory
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task
-from phone_host.serve.capture_guide import CaptureGuide
 from phone_host.serve.choices import Choices
 from phone_host.serve.commands import Commands
 from phone_host.serve.memory import Memory
-from phone_host.serve.places import page_folder
-from phone_host.serve.point_answer import answered
-from phone_host.serve.recordings import Recordings
+from phone_host.serve.point_answer import ShelfSource
+from phone_host.serve.saved import Recordings, keep_newest, page_folder
 from phone_host.serve.scanning import Scanning, scanned
-from phone_host.serve.shelf import PageSink, Shelf
-from phone_host.serve.snapshots import keep_newest
+from phone_host.serve.shelf import PageSink
 from phone_host.serve.workshop import Workshop
 from phone_host.stereo.core import StereoCore
 from phone_host.web.source import (
@@ -44,8 +41,6 @@ from phone_host.web.source import (
     Answer,
     Command,
     Do,
-    Measured,
-    Newest,
     PageState,
     ScanState,
     Surface,
@@ -64,7 +59,7 @@ _ANSWER_S: Final = 12.0
 _Asked = TypeVar("_Asked")
 
 
-class Station:
+class Station(ShelfSource):
     """The source behind the page of `serve`.
 
     Args:
@@ -72,8 +67,8 @@ class Station:
     """
 
     def __init__(self, commands: Commands) -> None:
+        super().__init__()
         self._commands = commands
-        self._shelf = Shelf()
         kept = commands.kept
         self._memory = Memory(kept)
         self._choosing = Lock()
@@ -114,26 +109,17 @@ class Station:
     def state(self) -> PageState:
         """See Source."""
         choices = self._memory.choices
-        return self._memory.state(
-            self._activities.now,
-            self._commands.shown(choices),
-            self._commands.command(choices) if choices.get("camera") else "",
+        known = PageState(
+            activity=self._activities.now,
+            settings=self._commands.shown(choices),
+            command=self._commands.command(choices) if choices.get("camera") else "",
             matchers=self._commands.matchers,
             stranger=self._stranger(choices.get("link", "")),
-            browser=find.browser_choice(self.feed.words),
             scan=self._scanned_state(),
             scan_command=self._commands.scan_command(choices),
             printing=self._workshop.state,
         )
-
-    def newest(self) -> Newest | None:
-        """See Source."""
-        found = self._shelf.newest()
-        return None if found is None else found.newest
-
-    def subscribe(self, told: Callable[[], None]) -> Callable[[], None]:
-        """See Source."""
-        return self._shelf.subscribe(told)
+        return self._memory.state(known, find.browser_choice(self.feed.words))
 
     def _scanned_state(self) -> ScanState | None:
         """Return how the scan goes; with the files that were saved of it since."""
@@ -149,10 +135,6 @@ class Station:
         finally:
             self._memory.outdate()
             self._shelf.tell()
-
-    def measure(self, points_px: Sequence[tuple[float, float]], number: int | None) -> Measured:
-        """See Source."""
-        return answered(self._shelf, points_px, number)
 
     def surface(self, since: int, most_points: int) -> Surface | None:
         """See Source."""
@@ -278,7 +260,7 @@ class Station:
             raise SettingsError("no camera of this machine is chosen", "find one, or type its address")
 
         def work(task: Task) -> None:
-            guide, found = CaptureGuide(self._show_checks), list[Diagnostic]()
+            guide, found = check.CaptureGuide(self._show_checks), list[Diagnostic]()
             guide.wait()
             try:
                 with task.held():

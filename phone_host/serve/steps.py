@@ -1,17 +1,24 @@
 """The way from nothing to a run and a scan, in words. Pure."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from common.words import counted
 from phone_host.web.source import Step, StepName
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Facts:
-    """What the steps are told from.
+def steps(
+    choices: Mapping[str, str],
+    *,
+    stranger: str = "",
+    checked: str = "",
+    pairs: int = 0,
+    is_running: bool = False,
+    scan: str = "",
+    has_scan: bool = False,
+) -> tuple[Step, ...]:
+    """Return the steps, each with what it has come to or what to do now.
 
-    Attributes:
+    Args:
         choices: options of `run`, by name.
         stranger: the chosen board that has to be enrolled first; empty: there is none.
         checked: what the last check of these two cameras came to; empty: there was none, or it failed.
@@ -20,53 +27,23 @@ class Facts:
         scan: how the scan goes, or went; empty: there was none.
         has_scan: whether its files are written.
     """
-
-    choices: Mapping[str, str]
-    stranger: str = ""
-    checked: str = ""
-    pairs: int = 0
-    is_running: bool = False
-    scan: str = ""
-    has_scan: bool = False
-
-
-def steps(facts: Facts) -> tuple[Step, ...]:
-    """Return the steps, each with what it has come to or what to do now."""
-    link, camera = facts.choices.get("link", ""), facts.choices.get("camera", "")
-    has_both = bool(link and camera)
+    link, camera = choices.get("link", ""), choices.get("camera", "")
+    no_pair = "" if link and camera else "choose both cameras first"
+    ran = "it runs" if is_running else f"the last run gave {counted(pairs, 'pair')}" if pairs else ""
     return (
-        _board(link, facts.stranger),
-        Step(name=StepName.CAMERA, done=bool(camera), words=camera or "choose this machine's camera"),
-        _step(
-            StepName.CHECK,
-            facts.checked,
-            "check both cameras before you calibrate" if has_both else "choose both cameras first",
-        ),
-        _calibration(facts.choices),
-        _step(
-            StepName.RUN,
-            _run_words(facts),
-            "start a run" if has_both else "choose both cameras first",
-        ),
-        _scan(facts, has_both=has_both),
+        _board(link, stranger),
+        _step(StepName.CAMERA, camera, "choose this machine's camera"),
+        _step(StepName.CHECK, checked, no_pair or "check both cameras before you calibrate"),
+        _calibration(choices),
+        _step(StepName.RUN, ran, no_pair or "start a run"),
+        Step(name=StepName.SCAN, done=bool(scan and has_scan), words=scan or no_pair or _scan_words(choices)),
     )
 
 
-def _scan(facts: Facts, *, has_both: bool) -> Step:
-    if facts.scan:
-        return Step(name=StepName.SCAN, done=facts.has_scan, words=facts.scan)
-    if not has_both:
-        return Step(name=StepName.SCAN, done=False, words="choose both cameras first")
-    if not {"calibration", "rectified"} & facts.choices.keys():
-        return Step(name=StepName.SCAN, done=False, words="calibrate first: a scan needs metres")
-    words = "press Start and slowly move the cameras around, or turn the turntable; press Stop when every side has been in view"
-    return Step(name=StepName.SCAN, done=False, words=words)
-
-
-def _run_words(facts: Facts) -> str:
-    if facts.is_running:
-        return "it runs"
-    return f"the last run gave {counted(facts.pairs, 'pair')}" if facts.pairs else ""
+def _scan_words(choices: Mapping[str, str]) -> str:
+    if not {"calibration", "rectified"} & choices.keys():
+        return "calibrate first: a scan needs metres"
+    return "press Start and slowly move the cameras around, or turn the turntable; press Stop when every side has been in view"
 
 
 def _step(name: StepName, come_to: str, to_do: str) -> Step:

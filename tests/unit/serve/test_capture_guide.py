@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from common.diagnostic import Diagnostic
 from phone_host.doctor.camera_check.check import Progress, Stage
 from phone_host.model.capture import Unseen
-from phone_host.serve.capture_guide import CaptureGuide
+from phone_host.serve.check import CaptureGuide
 
 
 def test_the_page_is_told_what_is_new_and_no_more() -> None:

@@ -28,10 +28,10 @@ from phone_host.serve.activities import Activities, Task
 from phone_host.serve.find import board_choice, stranger
 from phone_host.serve.memory import Memory
 from phone_host.serve.point_answer import answered
+from phone_host.serve.saved import keep_newest
 from phone_host.serve.scanning import Scanned, Scanning, page_words
 from phone_host.serve.shelf import PageSink, Shelf
-from phone_host.serve.snapshots import keep_newest
-from phone_host.serve.steps import Facts, steps
+from phone_host.serve.steps import steps
 from phone_host.verbs.serve import Status, told
 from phone_host.web.source import Activity, PageState, ScanState, StepName, Surface
 from tests.support.run_snapshots import run
@@ -214,22 +214,27 @@ def test_a_failure_is_told_with_its_remedy() -> None:
 
 def test_the_steps_lead_from_nothing_to_a_run_and_a_scan() -> None:
     """Each step says what to do until it is done, then what it has come to; a board that wants its code is not done."""
-    nothing = steps(Facts(choices={}))
+    nothing = steps({})
     assert [step.name for step in nothing] == list(StepName)
     assert not any(step.done for step in nothing)
     both = {"link": "tcp://b:1", "camera": "v4l2:auto"}
-    assert "board-agent pair" in steps(Facts(choices=both, stranger="tcp://b:1"))[0].words
-    chosen = steps(Facts(choices=both))
+    assert "board-agent pair" in steps(both, stranger="tcp://b:1")[0].words
+    chosen = steps(both)
     assert [step.done for step in chosen] == [True, True, False, False, False, False]
     assert "calibrate first" in chosen[5].words
-    ready = steps(Facts(choices={**both, "calibration": "rig.yaml"}, checked="seen", pairs=2))
+    ready = steps({**both, "calibration": "rig.yaml"}, checked="seen", pairs=2)
     assert [step.done for step in ready] == [True] * 5 + [False]
     assert ready[4].words == "the last run gave 2 pairs"
+<<<<<<< HEAD
     assert "slowly move the cameras" in ready[5].words
     scanned = steps(Facts(choices=both, scan="3 of 3 pairs are in the model", has_scan=True))[5]
+=======
+    assert "move the cameras slowly" in ready[5].words
+    scanned = steps(both, scan="3 of 3 pairs are in the model", has_scan=True)[5]
+>>>>>>> 2ab06bec (serve: what is saved is one module; memory completes the state; two sources share a shelf)
     assert (scanned.done, scanned.words) == (True, "3 of 3 pairs are in the model")
-    assert steps(Facts(choices={**both, "rectified": "yes"}, is_running=True))[3].done
-    assert steps(Facts(choices=both, is_running=True))[4].words == "it runs"
+    assert steps({**both, "rectified": "yes"}, is_running=True)[3].done
+    assert steps(both, is_running=True)[4].words == "it runs"
 
 
 def test_a_board_across_the_network_needs_its_code_once() -> None:
@@ -279,7 +284,7 @@ def test_a_calibration_that_was_stopped_is_told_from_one_that_was_computed() -> 
     memory = Memory({})
     memory.guide({"state": "running", "verdict": "usable"})
     memory.calibration_stopped("stopped: 5 views taken")
-    told = memory.state(Activity.IDLE, memory.choices, "").guide
+    told = memory.state(PageState(activity=Activity.IDLE)).guide
     assert told == {"state": "stopped", "verdict": "usable", "result": "stopped: 5 views taken"}
 
 
@@ -288,7 +293,7 @@ def test_the_memory_tells_a_change_once() -> None:
     memory, asked = Memory({"camera": "v4l2:auto"}), []
 
     def state() -> PageState:
-        return memory.state(Activity.IDLE, memory.choices, "")
+        return memory.state(PageState(activity=Activity.IDLE))
 
     assert state().changed == state().changed == 1
     memory.fail(Diagnostic("a", "b", Severity.FAIL))
