@@ -14,11 +14,11 @@ from common.diagnostic import Diagnostic, Severity
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.demo.scan_truth import ModelErrors, model_errors
-from phone_host.live.scan import LiveScan
 from phone_host.model import Side
 from phone_host.output.axes import Axes
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
+from phone_host.run.live_scan import LiveScan
 from phone_host.run.scan_files import FinishedScan
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.scan_wanted import ScanWanted

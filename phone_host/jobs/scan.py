@@ -24,13 +24,13 @@ from phone_host.jobs.output_folders import (
 from phone_host.jobs.run import PreparedRun, open_run
 from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.jobs.scan_request import ScanRequest, axes_beside, model_wanted, resumed_of
-from phone_host.live.scan import LiveScan
 from phone_host.output.axes import Axes
 from phone_host.recording.playback import Playback
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
 from phone_host.run.kept import partial_words
+from phone_host.run.live_scan import LiveScan
 from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
 from phone_host.run.sinks import Sink
 from phone_host.scan.scan_wanted import ScanWanted

@@ -9,11 +9,11 @@ from typing import Final
 
 from common.errors import SettingsError
 from phone_host.jobs.scan_request import box_of
-from phone_host.live.scan import LiveScan
 from phone_host.output.axes import Axes
 from phone_host.report.report_page import Headline
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport, scan_verdict
 from phone_host.report.stereo_report import ALWAYS
+from phone_host.run.live_scan import LiveScan
 from phone_host.scan.patches import Patches
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.tracking_words import Tracking

@@ -22,8 +22,8 @@ from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.discovery.enrolment import PairingCall
 from phone_host.doctor.host_doctor import examine
+from phone_host.jobs.calibrate.view import SnapshotValues
 from phone_host.jobs.run import PreparedRun
-from phone_host.live.calibration_view import SnapshotValues
 from phone_host.run.freed_memory import give_back_freed_memory
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task

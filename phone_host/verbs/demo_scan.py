@@ -19,7 +19,6 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.demo.scan_demonstration import ScanDemo, render_pictures, with_truth
 from phone_host.demo.scan_truth import ModelErrors
-from phone_host.live.scan_view import ScanPicture
 from phone_host.output.atomic import write_bytes
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
@@ -37,6 +36,7 @@ from phone_host.report.scan_lines import scan_lines
 from phone_host.run.progress_bar import announce, busy_bar, progress_bar, step_bar
 from phone_host.run.scan_files import FinishedScan, report_values, write_scan
 from phone_host.run.scan_result import require_something
+from phone_host.run.scan_view import ScanPicture
 from phone_host.scene.object_scene import ObjectScene, Setting, object_scene
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.rectify import rectify_rig

@@ -81,7 +81,7 @@ def _followed(scan: "PreparedScan", signals: StopSignals) -> EndReason:
     """Run, and tell whoever holds the cameras what helps: beside the surface on a terminal, else a line when it changes."""
     live = scan.live
     if sys.stderr.isatty():
-        from phone_host.live.scan_view import ScanPicture  # noqa: PLC0415 - likewise
+        from phone_host.run.scan_view import ScanPicture  # noqa: PLC0415 - likewise
 
         with ScanPicture(live) as picture:
             ended = scan.host.run(lambda: signals.stop, picture.refresh)

@@ -8,9 +8,9 @@ import pytest
 from rich.console import Console
 
 from phone_host.geometry.se3 import SE3
-from phone_host.live.scan import LiveScan
-from phone_host.live.scan_view import ScanPicture, small_view
 from phone_host.model import Side
+from phone_host.run.live_scan import LiveScan
+from phone_host.run.scan_view import ScanPicture, small_view
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.scan_wanted import ScanWanted
 from tests.support.plane_films import CORNER, plane_view, texture

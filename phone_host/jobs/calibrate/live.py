@@ -36,12 +36,12 @@ from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
 from phone_host.discovery.opened import open_named
 from phone_host.jobs.calibrate.earlier import Asked, Series, calibrated, every_pair
+from phone_host.jobs.calibrate.live_calibration import LiveCalibration, LiveSettings
 from phone_host.jobs.calibrate.request import CalibrateRequest
+from phone_host.jobs.calibrate.view import Lines, Picture, Shows, SnapshotFiles, Spoken, tell_sides
+from phone_host.jobs.calibrate.voice import Voice, speech_program
 from phone_host.jobs.output_folders import require_folder, unwritable
 from phone_host.jobs.picture_pairs import VIEWS
-from phone_host.live.calibration import LiveCalibration, LiveSettings
-from phone_host.live.calibration_view import Lines, Picture, Shows, SnapshotFiles, Spoken, tell_sides
-from phone_host.live.voice import Voice, speech_program
 from phone_host.model import Side, TimeOffset, Verdict
 from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import Sink

@@ -17,10 +17,10 @@ from common.ledger import StageTimes
 from common.peers import Peer
 from phone_host.discovery.found import Found
 from phone_host.doctor.camera_check.words import stored_finding
-from phone_host.live.scan import LiveScan
 from phone_host.model import FramePair, PairCounts, Processed, RectifiedPair, Result, Side
 from phone_host.model.capture import CaptureSource
 from phone_host.output.axes import Axes
+from phone_host.run.live_scan import LiveScan
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracking_words import Weakness
 from phone_host.serve import check

@@ -25,10 +25,10 @@ from phone_host.calibration.target.moving_board import BoardFinder, SizeCheck, S
 from phone_host.calibration.target.sharpness import BoardLook
 from phone_host.camera.factory import open_camera
 from phone_host.jobs.calibrate.live import ring_instead
-from phone_host.live.calibration import LiveCalibration, LiveSettings
-from phone_host.live.calibration_view import Lines, Picture, SnapshotFiles, Spoken
-from phone_host.live.newest import Newest
-from phone_host.live.voice import Voice, speech_program
+from phone_host.jobs.calibrate.live_calibration import LiveCalibration, LiveSettings
+from phone_host.jobs.calibrate.newest import Newest
+from phone_host.jobs.calibrate.view import Lines, Picture, SnapshotFiles, Spoken
+from phone_host.jobs.calibrate.voice import Voice, speech_program
 from phone_host.model import Image, Verdict
 from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.run.host_settings import HostSettings

@@ -27,7 +27,7 @@ from phone_host.calibration.target.corners import Board, Corners
 from phone_host.calibration.target.moving_board import BoardFinder, SizeCheck, SizeFinder
 from phone_host.calibration.target.sharpness import look_at
 from phone_host.diagnostics.run_snapshot import unused
-from phone_host.live.newest import Newest
+from phone_host.jobs.calibrate.newest import Newest
 from phone_host.model import Image, Result
 from phone_host.recording.view_folders import Pictures, ViewFolders
 from phone_host.report.summary import camera_troubles

@@ -5,7 +5,7 @@ import subprocess
 from collections.abc import Callable
 from typing import Final
 
-from phone_host.live.newest import Newest
+from phone_host.jobs.calibrate.newest import Newest
 
 _PROGRAMS: Final = (("termux-tts-speak",), ("espeak-ng",), ("spd-say", "--wait"), ("say",))
 _LONGEST_S: Final = 10.0
