@@ -40,8 +40,6 @@ class Course:
         queue: pairs their frames.
         worker: processes the pairs.
         ledgerer: knows what was processed.
-        step: called several times a second with the time, ns.
-        raise_failures: raises what a part of the run has failed with.
     """
 
     def __init__(
@@ -53,22 +51,27 @@ class Course:
         queue: PairQueue,
         worker: Worker,
         ledgerer: Ledgerer,
-        step: Callable[[int], None],
-        raise_failures: Callable[[], None],
     ) -> None:
         self._settings, self._own = settings, own
         self._camera, self._receiver = streams
         self._queue, self._worker, self._ledgerer = queue, worker, ledgerer
-        self._step, self._raise_failures = step, raise_failures
         self._time_limit = TimeLimit(settings.seconds_ns)
         self.refusal: BoardRefusal | None = None
 
-    def follow(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
+    def follow(
+        self,
+        stop: Callable[[], bool],
+        watch: Callable[[], None] | None,
+        step: Callable[[int], None],
+        raise_failures: Callable[[], None],
+    ) -> EndReason:
         """Follow the run to its end.
 
         Args:
             stop: called several times a second.
             watch: called as often, for a live view.
+            step: called as often with the time, ns.
+            raise_failures: raises what a part of the run has failed with.
 
         Raises:
             UnavailableError: no board came in time, or it does not talk to this host.
@@ -79,9 +82,9 @@ class Course:
         ending_since_ns: int | None = None
         while not self._worker.finished.wait(_STEP_S):
             now_ns = now.monotonic_ns()
-            self._raise_failures()
+            raise_failures()
             self._check_kinds()
-            self._step(now_ns)
+            step(now_ns)
             if watch is not None:
                 watch()
             if stop():
@@ -92,14 +95,14 @@ class Course:
             if self._time_limit.is_over(
                 now_ns, has_met_board=self._receiver.hello is not None, begun_ns=self._ledgerer.first_done_ns
             ):
-                return self._drain(stop, watch, EndReason.SECONDS_OVER)
+                return self._drain(stop, watch, raise_failures, EndReason.SECONDS_OVER)
             if self._receiver.ended or self._camera.ended:
                 ending_since_ns = now_ns if ending_since_ns is None else ending_since_ns
                 if self._all_paired() or now_ns - ending_since_ns > _LAST_PARTNER_NS:
                     if self._receiver.ended:
                         self._queue.board_ended()
-                    return self._drain(stop, watch, EndReason.STREAM_ENDED)
-        self._raise_failures()
+                    return self._drain(stop, watch, raise_failures, EndReason.STREAM_ENDED)
+        raise_failures()
         return EndReason.PAIRS_REACHED
 
     def _check_kinds(self) -> None:
@@ -125,7 +128,13 @@ class Course:
                 "start board-agent first, or give loop=1 in --camera",
             )
 
-    def _drain(self, stop: Callable[[], bool], watch: Callable[[], None] | None, ended: EndReason) -> EndReason:
+    def _drain(
+        self,
+        stop: Callable[[], bool],
+        watch: Callable[[], None] | None,
+        raise_failures: Callable[[], None],
+        ended: EndReason,
+    ) -> EndReason:
         """Let the worker finish the waiting pairs. No frame will follow."""
         self._queue.finish()
         while not self._worker.has_ended(_STEP_S):
@@ -133,7 +142,7 @@ class Course:
                 watch()
             if stop():
                 return EndReason.STOPPED
-        self._raise_failures()
+        raise_failures()
         reached = self._settings.pairs and self._ledgerer.processed >= self._settings.pairs
         return EndReason.PAIRS_REACHED if reached else ended
 

@@ -7,18 +7,16 @@ from typing import Final
 
 from common import now
 from common.camera.base import Camera
-from common.camera.image_numbers import ShowsFiles
 from common.diagnostic import Diagnostic, Severity
 from common.ledger import PairLedger
 from common.link.base import Link
 from common.orientation import UPRIGHT, Orientation
 from common.protocol.message import Pacing
-from phone_host.accounts.delays import SinkAccount, replay_facts
-from phone_host.accounts.image_motion import MotionMeter
+from phone_host.accounts.delays import replay_facts
 from phone_host.accounts.link_account import away_of
 from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RunSnapshot
-from phone_host.model import Processed, Result, Side
+from phone_host.model import Processed, Side
 from phone_host.recording.clock_messages import boot_of
 from phone_host.recording.playback import Playback
 from phone_host.recording.switch import RecordingSwitch
@@ -33,23 +31,16 @@ from phone_host.run.phase_steering import PhaseSteering
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.recording_sinks import RecordingSink
 from phone_host.run.rig_cameras import RigCameras
-from phone_host.run.sinks import FunctionSink, Sink
-from phone_host.run.sources import RecordedPairQueue, streams
+from phone_host.run.sinks import MotionSink, Sink
+from phone_host.run.sources import demand_of, paired_streams
 from phone_host.run.trust_sink import PERIOD_NS, DoubtLog, TrustSink
 from phone_host.run.worker import Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
-from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.refusals import refusal_text
-from phone_host.sync.fifo import FifoSettings, Overflow
-from phone_host.sync.stills import Stills
 
-_MOTION: Final = "motion"
 _STOP_S: Final = 0.4
 """A stopped run gives its current pair this long: Ctrl-C ends within a second, and the goodbye takes 0.3 s of it."""
-
-_UNHURRIED: Final = FifoSettings(1000, Overflow.BLOCK)
-"""A replay on demand waits for the worker: nothing is dropped."""
 
 _RECENT: Final = 60
 """While it runs, the latest 60 pairs are judged: two seconds at 30 pairs per second."""
@@ -80,15 +71,9 @@ class Host:
         *,
         recording: RecordingSwitch | None = None,
     ) -> None:
-        self._settings, self.recording, self.started_ns, self._ended_ns = settings, recording, now.monotonic_ns(), 0
-        self._own = own = camera.description
-        played = camera if isinstance(camera, Playback) else None
-        files = camera if isinstance(camera, ShowsFiles) else None
-        demand = DemandClock(
-            own.pacing,
-            None if files is None else Stills(files.images, files.numbers),
-            is_timeless=played is not None and played.is_timeless,
-        )
+        self._settings, self._own, self._core, self.recording = settings, camera.description, core, recording
+        self.started_ns, self._ended_ns = now.monotonic_ns(), 0
+        rig, side, demand = None if core is None else core.rig, settings.board_side, demand_of(camera)
         self._files = FileSink(  # first of all, because it may be refused
             settings.out,
             settings.save_every,
@@ -99,32 +84,18 @@ class Host:
         )
 
         # Frames of both cameras, or a recording of them, become pairs.
-        self._queue = RecordedPairQueue(
-            _UNHURRIED if played is not None and demand.is_timeless else settings.fifo,
-            settings.tolerance_ns,
-            own.period_ns,
-            demand=demand,
-            time_offset_ns=settings.time_offset.offset_ns,
-            own_images=None if files is None else files.images,
-            clock=now.monotonic_ns if played is None else played.clock_ns,
-            marking=now.monotonic_ns,
-        )
-        self._queue.recorder = recording
-        self._camera, self._receiver = streams(camera, links, self._queue, demand)
+        self._queue, self._camera, self._receiver = paired_streams(settings, camera, links, demand, recording)
 
         # Pairs become depth.
-        rig = None if core is None else core.rig
-        self._matcher_is_fastest = core is not None and core.matcher_is_fastest
-        self._rig_rejected = rig is not None and rig.is_rejected
         self._budget = None if core is None or settings.budget is None else PairBudget(settings.budget, core)
         pipeline = Pipeline(
             core,
-            settings.board_side,
+            side,
             now.monotonic_ns,
             Interpolator() if settings.interpolate else None,
             settings.most_pixels,
             budget=self._budget,
-            host_orientation=own.orientation,
+            host_orientation=self._own.orientation,
         )
         self._ledgerer = Ledgerer(self._receiver.account.was_away, lambda: demand.is_timeless)
 
@@ -133,37 +104,31 @@ class Host:
         if core is not None and rig is not None:
             self._keeper = DriftKeeper(
                 core,
-                settings.board_side,
+                side,
                 corrects=settings.corrects,
                 start=settings.overlay,
                 is_timeless=demand.is_timeless,
                 interpolates=settings.interpolate,
             )
         self._trust = TrustSink(core, period_ns=0 if demand.is_timeless else PERIOD_NS, keeper=self._keeper)
-        self._motion = MotionMeter()
-        motion = FunctionSink(_MOTION, self._measure_motion)
+        self._motion = MotionSink(side, demand)
         recorded = () if recording is None else (RecordingSink(recording),)
-        self._sinks: tuple[Sink, ...] = (self._files, motion, self._trust, *recorded, *sinks)
+        self._sinks: tuple[Sink, ...] = (self._files, self._motion, self._trust, *recorded, *sinks)
         self._worker = Worker(
             self._queue, pipeline, self._ledgerer, self._sinks, most_pairs=settings.pairs, taken=self._receiver.wake
         )
 
         # Meanwhile the run's own thread looks after all of it, several times a second.
-        self._cameras = RigCameras(rig, settings.board_side, own, self._camera, self._receiver)
-        self._doubts = DoubtLog(lambda: concerns(self.snapshot()))
+        self._cameras = RigCameras(rig, side, self._own, self._camera, self._receiver)
         self._steering = PhaseSteering(settings.steered, self._receiver, self._camera, self._queue)
+        self._doubts, streams = DoubtLog(), (self._camera, self._receiver)
         self._course = Course(
-            settings,
-            own,
-            (self._camera, self._receiver),
-            queue=self._queue,
-            worker=self._worker,
-            ledgerer=self._ledgerer,
-            step=self._step,
-            raise_failures=self._raise_failures,
+            settings, self._own, streams, queue=self._queue, worker=self._worker, ledgerer=self._ledgerer
         )
-        pace = "demand" if demand.is_timeless else "clock"
-        self._replay = None if played is None else replay_facts(str(played.file), pace, played.ledgers())
+        self._replay = None
+        if isinstance(camera, Playback):
+            pace = "demand" if demand.is_timeless else "clock"
+            self._replay = replay_facts(str(camera.file), pace, camera.ledgers())
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None = None) -> EndReason:
         """Run until the number of pairs is reached, a stream ends or `stop` returns True.
@@ -181,7 +146,7 @@ class Host:
             self._worker.start()
             self._receiver.start()
             self._camera.start()
-            ended = self._course.follow(stop, watch)
+            ended = self._course.follow(stop, watch, self._step, self._raise_failures)
         except BaseException:
             with suppress(Exception):  # report what ended the run, not its consequences
                 self._end(_STOP_S)
@@ -288,6 +253,7 @@ class Host:
             failure: the error that ended it; None: none did.
         """
         books, receiver = self._ledgerer.books(), self._receiver
+        rig = None if self._core is None else self._core.rig
         return RunSnapshot(
             ended=ended,
             processed=books.processed,
@@ -300,7 +266,7 @@ class Host:
             estimate=receiver.estimate,
             tolerance_ns=self._queue.tolerance_ns,
             fifo=self._settings.fifo,
-            sinks=tuple(account for sink in self._sinks for account in sink.accounts if not self._is_unneeded(account)),
+            sinks=tuple(account for sink in self._sinks for account in sink.accounts),
             unwritten=self._files.unwritten,
             spoiled=self._camera.spoiled,
             skipped=self._camera.skipped,
@@ -310,8 +276,8 @@ class Host:
             alignment=self._steering.alignment,
             camera=self._camera.health,
             period_ns=self._period_ns,
-            motion_px_s=float("nan") if self._queue.is_timeless else self._motion.px_s,
-            width_px=self._motion.width_px,
+            motion_px_s=float("nan") if self._queue.is_timeless else self._motion.meter.px_s,
+            width_px=self._motion.meter.width_px,
             interpolated=self._settings.interpolate,
             spoiled_images=books.spoiled_images,
             failed_pairs=books.failed_pairs,
@@ -328,22 +294,18 @@ class Host:
             after_gap_ns=books.after_gap_ns,
             images=self._trust.trust,
             depth=books.depth,
-            rig_rejected=self._rig_rejected,
+            rig_rejected=rig is not None and rig.is_rejected,
             asked_pairs=self._settings.pairs,
             save_every=0 if self._settings.out is None else self._settings.save_every,
             last_s=max(0, books.last_done_ns - self.started_ns) / 1e9,
             orientations=self._orientations,
             matcher_note=self._settings.matcher_note,
-            matcher_is_fastest=self._matcher_is_fastest,
+            matcher_is_fastest=self._core is not None and self._core.matcher_is_fastest,
             budget=None if self._budget is None else self._budget.account,
             drift=None if self._keeper is None else self._keeper.drift,
             recording=None if self.recording is None else self.recording.account,
             replay=self._replay,
         )
-
-    def _is_unneeded(self, account: SinkAccount) -> bool:
-        """Whether nobody waits for a sink's results: stills do not move, so what was not measured is no loss."""
-        return self._queue.is_timeless and account.name == _MOTION
 
     @property
     def _stamps_are_exact(self) -> bool:
@@ -367,16 +329,11 @@ class Host:
             return 0
         return max(hello.camera.period_ns, self._own.period_ns)
 
-    def _measure_motion(self, result: Result) -> None:
-        # Use the host's image: the board's may have been interpolated to another moment.
-        seen = result.processed.pair.right if self._settings.board_side is Side.LEFT else result.processed.pair.left
-        self._motion.add(seen, result.ledger.host.exposed_ns, result.ledger.done_ns)
-
     def _step(self, now_ns: int) -> None:
         """Do what is done several times a second."""
         self._cameras.look()
         self._steering.update(now_ns)
-        self._doubts.look(now_ns)
+        self._doubts.look(now_ns, lambda: concerns(self.snapshot()))
         if self.recording is not None:
             self.recording.clock(self._receiver.estimate, boot_of(self._receiver.hello), now_ns)
 

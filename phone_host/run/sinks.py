@@ -12,7 +12,9 @@ from typing import Any, Final, Generic, Protocol, TypeVar
 
 from common import now
 from phone_host.accounts.delays import Series, SinkAccount
-from phone_host.model import Result
+from phone_host.accounts.image_motion import MotionMeter
+from phone_host.model import Result, Side
+from phone_host.stream.demand_clock import DemandClock
 
 T = TypeVar("T")
 
@@ -199,3 +201,26 @@ class FunctionSink(OneQueueSink):
 
     def __init__(self, name: str, take: Callable[[Result], None], *, depth: int = DEPTH, waits: bool = False) -> None:
         super().__init__(SinkQueue(name, take, depth=depth, waits=waits))
+
+
+class MotionSink(FunctionSink):
+    """Measures how fast the host camera's image moves. The board's is not used: it may have been interpolated to another moment.
+
+    Args:
+        board_side: which view the board's camera is.
+        demand: tells whether the run's images are stills: these do not move, so what was not measured is no loss.
+    """
+
+    def __init__(self, board_side: Side, demand: DemandClock) -> None:
+        super().__init__("motion", self._measure)
+        self._is_board_left, self._demand, self.meter = board_side is Side.LEFT, demand, MotionMeter()
+
+    @property
+    def accounts(self) -> tuple[SinkAccount, ...]:
+        """See Sink; of stills there is none."""
+        return () if self._demand.is_timeless else super().accounts
+
+    def _measure(self, result: Result) -> None:
+        pair = result.processed.pair
+        seen = pair.right if self._is_board_left else pair.left
+        self.meter.add(seen, result.ledger.host.exposed_ns, result.ledger.done_ns)

@@ -108,27 +108,23 @@ class TrustSink(OneQueueSink):
 
 
 class DoubtLog:
-    """Logs each reason not to trust the depth of a run when it appears and when it has gone.
+    """Logs each reason not to trust the depth of a run when it appears and when it has gone."""
 
-    Args:
-        judge: returns the present concerns.
-    """
-
-    def __init__(self, judge: Callable[[], Iterable[Diagnostic]]) -> None:
-        self._judge = judge
+    def __init__(self) -> None:
         self._known: frozenset[str] = frozenset()
         self._due_ns = 0
 
-    def look(self, now_ns: int) -> None:
+    def look(self, now_ns: int, judge: Callable[[], Iterable[Diagnostic]]) -> None:
         """Log what has changed, at most once a second.
 
         Args:
             now_ns: CLOCK_MONOTONIC, ns.
+            judge: returns the present concerns.
         """
         if now_ns < self._due_ns:
             return
         self._due_ns = now_ns + _LOOK_NS
-        found = {concern.code: concern for concern in self._judge()}
+        found = {concern.code: concern for concern in judge()}
         for doubt in found.keys() - self._known:
             concern = found[doubt]
             _LOG.warning(event("depth_doubtful", doubt=doubt, problem=concern.message, remedy=concern.remedy))
