@@ -11,10 +11,6 @@ class CameraWatch:
 
     Attributes:
         fd: the descriptor that the waiter waits on; None: there is none.
-
-    Args:
-        camera: the camera.
-        waiter: waits.
     """
 
     def __init__(self, camera: Camera, waiter: Waiter) -> None:

@@ -89,12 +89,7 @@ def _is_socket(path: Path) -> bool:
 
 
 class _Agents:
-    """The running agents that use a key folder: usually one.
-
-    Args:
-        context: context of the sockets.
-        keys: the folder.
-    """
+    """The running agents that use a key folder: usually one."""
 
     def __init__(self, context: "zmq.Context[zmq.Socket[bytes]]", keys: KeyFolder) -> None:
         self._context, self._keys = context, keys

@@ -10,14 +10,7 @@ _SILENT_NS: Final = 3_000_000_000
 
 
 class StatusLine:
-    """Makes the status line from the account of the frames.
-
-    Args:
-        camera: the camera's URI.
-        pacing: whether it delivers frames by itself.
-        links: URIs of the links.
-        now_ns: CLOCK_MONOTONIC now, ns.
-    """
+    """Makes the status line from the account of the frames."""
 
     def __init__(self, camera: str, pacing: Pacing, links: tuple[str, ...], now_ns: int) -> None:
         self._camera = camera

@@ -76,13 +76,7 @@ MOST_LETTERS: Final = 48
 
 
 def identity_of(driver: str, name: str, serial: str) -> CameraIdentity:
-    """Make an identity of what a driver says, which may be any text.
-
-    Args:
-        driver: kernel driver.
-        name: the camera's own name.
-        serial: its serial number.
-    """
+    """Make an identity of what a driver says, which may be any text."""
     return CameraIdentity(*(text.encode("utf-8", "replace").decode()[:MOST_LETTERS] for text in (driver, name, serial)))
 
 

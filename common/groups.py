@@ -2,20 +2,12 @@
 
 
 def group_name(gid: int) -> str:
-    """Return a group's name; empty if it has none.
-
-    Args:
-        gid: the group's number.
-    """
+    """Return a group's name; empty if it has none."""
     return _entry(gid)[0]
 
 
 def group_of_one(gid: int) -> str:
-    """Return the name of a group that has no member, or only one of its own name; empty otherwise.
-
-    Args:
-        gid: the group's number.
-    """
+    """Return the name of a group that has no member, or only one of its own name; empty otherwise."""
     name, members = _entry(gid)
     return name if members <= {name} else ""
 

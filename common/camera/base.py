@@ -225,11 +225,7 @@ class Camera(Protocol):
         """Tell the camera that nobody listens, so a device may rest. Repeating the call is harmless."""
 
     def resume(self, now_ns: int) -> None:
-        """Tell the camera that somebody listens again: frames come as soon as possible. Repeating the call is harmless.
-
-        Args:
-            now_ns: CLOCK_MONOTONIC now, ns.
-        """
+        """Tell the camera that somebody listens again: frames come as soon as possible. Repeating the call is harmless."""
 
     def close(self) -> None:
         """Release the device."""

@@ -67,12 +67,6 @@ _SERVERS: Final = ("http://", "https://")
 def open_camera(uri: str, clock: str, now_ns: int, example: str = EXAMPLE) -> Camera:
     """Open the camera that a URI names.
 
-    Args:
-        uri: see EXAMPLE.
-        clock: name of this machine's clock, for the stamps.
-        now_ns: CLOCK_MONOTONIC now, ns.
-        example: URIs that the program takes, for an error.
-
     Raises:
         SettingsError: the URI makes no sense.
         UnavailableError: there is no such device or folder.
@@ -90,11 +84,6 @@ def open_camera(uri: str, clock: str, now_ns: int, example: str = EXAMPLE) -> Ca
 
 def parse_camera(uri: str, clock: str, example: str = EXAMPLE) -> object:
     """Parse a camera URI without opening anything.
-
-    Args:
-        uri: see EXAMPLE.
-        clock: name of this machine's clock, for the stamps.
-        example: URIs that the program takes, for an error.
 
     Returns:
         The camera's settings: ReplaySettings or V4l2Settings; None for another package's camera, which parses them when it opens.

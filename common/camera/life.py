@@ -115,10 +115,6 @@ class Life:
 
     Attributes:
         counts: what has happened.
-
-    Args:
-        settings: how patient it is.
-        now_ns: the time.
     """
 
     def __init__(self, settings: LifeSettings, now_ns: int) -> None:

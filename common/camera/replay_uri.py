@@ -84,10 +84,6 @@ def open_replay(
 ) -> ReplayCamera | RecordedFilm | RecordedStills:
     """Open what shows images of then.
 
-    Args:
-        settings: what to show.
-        now_ns: CLOCK_MONOTONIC now, ns.
-
     Raises:
         UnavailableError: there is no such folder or file.
         DataError: there is no image, or one is unreadable.

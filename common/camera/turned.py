@@ -12,12 +12,7 @@ from common.protocol.message import CameraDescription
 
 
 class TurnedCamera:
-    """Passes everything on to the camera itself, whatever its kind offers, except its description.
-
-    Args:
-        camera: the camera, open.
-        orientation: how it is mounted.
-    """
+    """Passes everything on to the camera itself, whatever its kind offers, except its description."""
 
     def __init__(self, camera: Camera, orientation: Orientation) -> None:
         self._camera = camera

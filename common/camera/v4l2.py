@@ -61,10 +61,6 @@ _AUTO_EXPOSURE_NS: Final = 1_000_000_000
 class V4l2Camera:
     """A camera of this machine's kernel.
 
-    Args:
-        settings: what is asked for.
-        now_ns: CLOCK_MONOTONIC now, ns.
-
     Raises:
         UnavailableError: there is no such camera, it may not be opened, or another program has it.
         SettingsError: it lacks what is asked for.

@@ -188,11 +188,7 @@ def lower_qualities(control: Control, present: int) -> tuple[int, ...]:
 
 
 class ControlPlan:
-    """The order in which a camera's controls are set.
-
-    Args:
-        controls: what the camera has.
-    """
+    """The order in which a camera's controls are set."""
 
     def __init__(self, controls: tuple[Control, ...]) -> None:
         self._by_id = {control.id: control for control in controls}

@@ -141,9 +141,6 @@ def _captures(path: Path) -> bool:
 class Device:
     """An open, non-blocking V4L2 node.
 
-    Args:
-        path: the node or a link to it.
-
     Raises:
         UnavailableError: it is missing, not permitted, or not a V4L2 node.
     """

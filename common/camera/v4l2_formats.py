@@ -144,11 +144,6 @@ def rate_text(rate_hz: Fraction) -> str:
 def choose(offers: tuple[FormatOffer, ...], wanted: Wanted, camera: str) -> Choice:
     """Choose encoding and size.
 
-    Args:
-        offers: what the camera offers.
-        wanted: what the user asks for.
-        camera: the camera's name in errors.
-
     Returns:
         The first fitting format in the order of PREFERENCE. Without a requested size: 640x480, otherwise the largest below it, otherwise the smallest.
 
@@ -190,11 +185,6 @@ def choose(offers: tuple[FormatOffer, ...], wanted: Wanted, camera: str) -> Choi
 def choose_rate(rates: Rates, wanted: Wanted, camera: str) -> Fraction:
     """Choose the frame rate.
 
-    Args:
-        rates: what the camera offers at the size.
-        wanted: what the user asks for.
-        camera: the camera's name in errors.
-
     Returns:
         The rate, Hz. Without a wish: the highest up to 30, or the lowest there is.
 
@@ -221,10 +211,6 @@ def choose_rate(rates: Rates, wanted: Wanted, camera: str) -> Fraction:
 
 def slower_rates(rates: Rates, present_hz: Fraction) -> tuple[Fraction, ...]:
     """Return the rates to which a camera can be slowed down.
-
-    Args:
-        rates: what it offers at its size.
-        present_hz: the current rate, Hz.
 
     Returns:
         Rates below that, Hz, the highest first. For a camera that takes any rate between two: fractions of the current one.

@@ -213,11 +213,7 @@ def read_disk(path: Path) -> Disk:
 
 
 def read_clocks(program: Path) -> Clocks:
-    """The machine's clocks.
-
-    Args:
-        program: folder of this program's files.
-    """
+    """The machine's clocks."""
     newest_s = max((file.stat().st_mtime for file in program.glob("*.py")), default=0.0)
     source = Path("/sys/devices/system/clocksource/clocksource0/current_clocksource")
     return Clocks(

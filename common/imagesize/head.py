@@ -92,11 +92,6 @@ def require_pixels(size_px: tuple[int, int], most_pixels: int, name: str) -> Non
 def require_believable(head: ImageHead, most_pixels: int, name: str) -> None:
     """Check an image's size, the memory it takes decoded, and the pieces in which it is decoded, against the limit.
 
-    Args:
-        head: the image's header.
-        most_pixels: the limit.
-        name: the image's name in errors.
-
     Raises:
         ImageSizeError: it has more pixels, takes more memory, or has a side that is too long.
     """

@@ -69,11 +69,6 @@ def _orientation(data: bytes, name: str) -> Orientation:
 def pixel_chunks(data: bytes, head: ImageHead, name: str) -> bytes:
     """Return the chunks of a PNG that carry pixels, preceded by its start, if the image can be whole.
 
-    Args:
-        data: the encoded image.
-        head: the result of `png_head`.
-        name: the image's name in errors.
-
     Returns:
         A PNG; the same bytes if it has no other chunks.
 

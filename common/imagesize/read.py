@@ -47,11 +47,6 @@ def read_head(data: bytes, name: str) -> ImageHead:
 def whole_image(data: bytes, head: ImageHead, name: str) -> bytes:
     """Check that encoded bytes can be the whole image of their header, as far as this shows without decoding.
 
-    Args:
-        data: the encoded image.
-        head: the result of `read_head`.
-        name: the image's name in errors.
-
     Returns:
         What a decoder should get: the same bytes. Of a PNG only the chunks that carry pixels, because texts and colour profiles may be bombs. A TIFF
         says that it is upright, so that no decoder turns it; the caller does, by `head.orientation`.

@@ -52,12 +52,7 @@ def tiff_head(data: bytes, name: str) -> ImageHead:
 
 
 def as_stored(data: bytes, name: str) -> bytes:
-    """Return a TIFF whose orientation tag says upright. Decoders turn a TIFF by that tag, some only in part; no other format.
-
-    Args:
-        data: the encoded image, whose header `tiff_head` has read.
-        name: the image's name in errors.
-    """
+    """Return a TIFF whose orientation tag says upright. Decoders turn a TIFF by that tag, some only in part; no other format."""
     changed = bytearray(data)
     order = TIFF_KINDS[data[:4]][0]
     for tag, _, at, code in _numbers(data, name):

@@ -107,9 +107,4 @@ class TakesNewHosts(Protocol):
         """Where it listens."""
 
     def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
-        """Let in new hosts by a code, for all secured links of this board.
-
-        Args:
-            links: the secured links' `endpoint`s.
-            keys: the board's keys.
-        """
+        """Let in new hosts by a code, for all secured links of this board."""

@@ -42,11 +42,7 @@ class Seldom:
     _due_ns: int = 0
 
     def now(self, now_ns: int) -> bool:
-        """Count one more event; return whether to log it.
-
-        Args:
-            now_ns: CLOCK_MONOTONIC, ns.
-        """
+        """Count one more event; return whether to log it."""
         self.count += 1
         if now_ns < self._due_ns:
             return False

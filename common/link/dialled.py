@@ -70,20 +70,13 @@ class Dialled:
         self.inbox.socket.connect(self._address)
 
     def hang_up(self, now_ns: int) -> None:
-        """Drop the peer that answered; redial later, when it may be a different one.
-
-        Args:
-            now_ns: CLOCK_MONOTONIC now, ns.
-        """
+        """Drop the peer that answered; redial later, when it may be a different one."""
         self.due_ns, self.inbox.may_have = now_ns + REDIAL_NS, True
         with suppress(zmq.ZMQError):
             self.inbox.socket.disconnect(self._address)
 
     def broke(self, now_ns: int) -> bool:
         """Handle one monitor event; return whether it says that the connection broke.
-
-        Args:
-            now_ns: CLOCK_MONOTONIC now, ns.
 
         Raises:
             UnavailableError: the peer has turned us away; it will be redialled later.

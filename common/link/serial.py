@@ -35,10 +35,6 @@ _MOST_DISCARDED: Final = 1000
 class SerialLine:
     """A serial port opened in raw mode, exclusively for this process.
 
-    Args:
-        path: the device.
-        baud: speed, for ports that have one.
-
     Raises:
         UnavailableError: it cannot be had now.
     """

@@ -32,9 +32,6 @@ class Inbox:
         socket: the socket.
         may_have: whether `has_news` may say yes.
         is_told: whether its descriptor was readable since it was last asked: hardly ever for nothing.
-
-    Args:
-        sock: the socket.
     """
 
     __slots__ = ("_asked", "_fd", "is_told", "may_have", "socket")

@@ -180,10 +180,6 @@ class ZeroMqListener(_AlwaysReady):
     def open_door(self, links: Sequence[str], keys: KeyFolder) -> None:
         """Let in new hosts by a code, for all secured links of this board.
 
-        Args:
-            links: the secured links' `endpoint`s.
-            keys: the board's keys.
-
         Raises:
             SettingsError: a link has no port after its own.
             DataError: the key files are bad.

@@ -191,11 +191,7 @@ class _VersionAction(argparse.Action):
 
 
 def add_version_option(parser: argparse.ArgumentParser) -> None:
-    """Add `--version`.
-
-    Args:
-        parser: the command's own parser, or a verb's.
-    """
+    """Add `--version`."""
     parser.add_argument(
         "--version", action=_VersionAction, nargs=0, help="print the versions of package, wire and files"
     )

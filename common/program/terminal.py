@@ -24,20 +24,12 @@ _FARTHEST: Final = 0.45
 
 
 def columns(stream: TextIO | None = None) -> int:
-    """Return the width of the terminal that a stream writes to, in characters; 0 if it is no terminal.
-
-    Args:
-        stream: standard output if left out.
-    """
+    """Return the width of the terminal that a stream writes to, in characters; 0 if it is no terminal."""
     return _size(stream or sys.stdout).columns
 
 
 def rows(stream: TextIO | None = None) -> int:
-    """Return the height of the terminal that a stream writes to, in lines; 0 if it is no terminal.
-
-    Args:
-        stream: standard output if left out.
-    """
+    """Return the height of the terminal that a stream writes to, in lines; 0 if it is no terminal."""
     return _size(stream or sys.stdout).lines
 
 

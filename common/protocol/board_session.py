@@ -165,11 +165,7 @@ class BoardSession:
         return self._host is not None and not self._host.reads_long and self._camera.orientation != UPRIGHT
 
     def begin_clock(self, boot_id: str) -> None:
-        """Record that this machine has slept and its clock stood still. The host must greet again and learn the clock from scratch.
-
-        Args:
-            boot_id: identifies the new life of the clock.
-        """
+        """Record that this machine has slept and its clock stood still. The host must greet again and learn the clock from scratch."""
         self._boot_id = boot_id
         self._host = None
 
@@ -200,14 +196,7 @@ class BoardSession:
     def receive(  # noqa: PLR0911 - one line for each kind of message
         self, connection: bytes, message: Message, now_ns: int, counts: BoardCounts
     ) -> list[Outgoing]:
-        """Take one message from a connection.
-
-        Args:
-            connection: where it came from.
-            message: what came.
-            now_ns: its arrival on the board's clock, ns.
-            counts: the current account of this session's frames.
-        """
+        """Take one message from a connection."""
         self._notice_absence(now_ns)
         if isinstance(message, HostHello):
             # An answer after the goodbye would begin the session anew, only for it to vanish.

@@ -273,13 +273,7 @@ class Desk:
             self._code = None
 
     def receive(self, connection: bytes, word: Word, now_ns: int) -> list[Output]:
-        """Handle a word.
-
-        Args:
-            connection: the connection it came from.
-            word: what was said.
-            now_ns: CLOCK_MONOTONIC, ns.
-        """
+        """Handle a word."""
         outputs = self.tick(now_ns)
         attempt = self._attempt
         is_theirs = attempt is not None and attempt.connection == connection

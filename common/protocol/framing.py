@@ -94,11 +94,7 @@ def unit_parts(side: LinkEnd, unit: Unit) -> tuple[bytes, Buffer, bytes]:
 
 
 class Deframer:
-    """Finds the peer's units.
-
-    Args:
-        peer: who writes them.
-    """
+    """Finds the peer's units."""
 
     def __init__(self, peer: LinkEnd) -> None:
         self._marker = bytes((peer.value,))

@@ -22,10 +22,6 @@ _NEVER: Final = 2**63 - 1
 class Carriage:
     """The link that carries frames now, and the link that shall carry them.
 
-    Args:
-        host_id: random id of this process's life.
-        paths: all links.
-
     Attributes:
         carrier: the link that carries frames now; None if there is none.
         wanted: the link that shall carry them; None if there is none.
@@ -51,12 +47,7 @@ class Carriage:
         return self._insist(now_ns) if self.pending and now_ns >= self._hello_due_ns else []
 
     def want(self, path: HostPath, now_ns: int) -> list[Output]:
-        """Ask for frames over an open link.
-
-        Args:
-            path: which.
-            now_ns: host's clock, ns.
-        """
+        """Ask for frames over an open link."""
         self.wanted, self.pending, self._pending_since_ns = path, True, now_ns
         return self._insist(now_ns)
 

@@ -150,11 +150,6 @@ class HostSession:
     def take_frame(self, link: int, frame: FrameMessage, now_ns: int) -> int | StaleReason:
         """Take a frame, as `receive` does, without making outputs of it: it comes thirty times a second.
 
-        Args:
-            link: the link that it came over.
-            frame: what came.
-            now_ns: arrival of its last byte on the host's clock, ns.
-
         Returns:
             How many frames before it never came, or why it must not be used.
         """
@@ -225,11 +220,7 @@ class HostSession:
                 path.waves.hasten(now_ns)
 
     def begin_clock(self, now_ns: int) -> list[Output]:
-        """Record that this machine's clock stood still. All echoes under way are void, and so is the credit granted.
-
-        Args:
-            now_ns: host's clock, ns.
-        """
+        """Record that this machine's clock stood still. All echoes under way are void, and so is the credit granted."""
         for path in self._paths:
             if path.is_open:
                 path.waves.open(now_ns)

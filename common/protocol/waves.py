@@ -122,10 +122,6 @@ class Waves:
         wave, all answers are of that kind. A fast echo is kept until its wave has ended: learning from it takes longer than the echo did, so the
         board's processor would go idle meanwhile and wake late, and every question would travel longer than its answer (decision 0009).
 
-        Args:
-            pong: the answer.
-            now_ns: its arrival, host's clock, ns.
-
         Echoes to learn from, and the wave's next question if there is one.
             Echoes to learn from, and the wave's next question, if there is one.
         """

@@ -70,9 +70,6 @@ class CdrWriter:
 class CdrReader:
     """Takes a message apart, value by value, in their order.
 
-    Args:
-        data: the message with its header.
-
     Raises:
         BrokenMessageError: it has another header.
     """

@@ -81,10 +81,6 @@ class Salvage:
         tried_bytes: how many bytes of the file were looked at in all records that are none.
         inflated_bytes: how many bytes chunks became that were decompressed and are whole.
         wasted_bytes: how many bytes chunks became, at most, that were decompressed and are not.
-
-    Args:
-        data: the whole file.
-        inflate: for chunks that are compressed.
     """
 
     def __init__(self, data: StoredData, inflate: Inflate) -> None:

@@ -72,11 +72,6 @@ class Ends:
 def open_ends(interface: Interface, camera: str, folder: Path) -> Iterator[Ends]:
     """Run both ends of an interface while a block runs.
 
-    Args:
-        interface: the interface to start.
-        camera: URI of the board's camera.
-        folder: for sockets and names of terminals.
-
     Raises:
         UnavailableError: the board's process or the relay did not start.
     """

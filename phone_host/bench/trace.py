@@ -47,9 +47,6 @@ _KINDS: Final = (
 def trace_json(runs: Sequence[TracedRun]) -> str:
     """Make the whole file.
 
-    Args:
-        runs: each becomes two processes, its board and its host.
-
     Returns:
         A JSON object with `traceEvents`: metadata first, then events by time.
     """

@@ -38,11 +38,6 @@ _TURNED: Final = "turned after the first image: nothing is used until it is turn
 class BrowserCamera(FarCamera):
     """A browser's camera while one run uses it.
 
-    Args:
-        settings: what is wanted.
-        feed: brings the browser.
-        now_ns: CLOCK_MONOTONIC now, ns.
-
     Raises:
         UnavailableError: no browser gives images in time.
     """

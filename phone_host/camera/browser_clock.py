@@ -45,13 +45,7 @@ class BrowserClock:
         return 0 if estimate is None else estimate.round_trip_ns
 
     def asked(self, echo: EchoAsked, t1_ns: int, t2_ns: int) -> None:
-        """Note that an echo was answered.
-
-        Args:
-            echo: what the browser asked.
-            t1_ns: when it came, host's clock, ns.
-            t2_ns: when the answer was sent.
-        """
+        """Note that an echo was answered."""
         self._open[echo.number] = (echo, t1_ns, t2_ns)
         if len(self._open) > _MOST_OPEN:
             self._open.popitem(last=False)

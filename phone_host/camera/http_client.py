@@ -92,9 +92,6 @@ class Connection:
     def read(self, patience_s: float) -> bytes:
         """Wait for bytes.
 
-        Args:
-            patience_s: how long to wait, s.
-
         Returns:
             The bytes that have come; empty at the end of the stream.
 

@@ -91,10 +91,6 @@ def without_orientation(uri: str) -> tuple[str, Orientation]:
 def http_settings(uri: str, clock: str) -> HttpSettings:
     """Parse the address of a server.
 
-    Args:
-        uri: see EXAMPLE.
-        clock: name of the stamps' clock.
-
     Raises:
         SettingsError: the address or an option is invalid.
     """

@@ -37,9 +37,6 @@ _LONGEST_WAIT_S: Final = 3600.0
 class HttpCamera(FarCamera):
     """The images of one server.
 
-    Args:
-        settings: the server.
-
     Raises:
         UnavailableError: the server cannot be reached, refuses, or sends no JPEG images.
     """

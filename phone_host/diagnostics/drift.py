@@ -98,10 +98,6 @@ def told_as_a_turn(images: tuple[Diagnostic, ...], moved: tuple[Diagnostic, ...]
 
     Features that agree on one turn of a camera are those of one scene, upright and not mirrored; single pairs of a rig
     that was knocked by some degrees may look so.
-
-    Args:
-        images: what single pairs made doubtful.
-        moved: what the rig's departure did.
     """
     if all(concern.code != Code.RIG_MOVED for concern in moved):
         return images

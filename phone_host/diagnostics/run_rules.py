@@ -82,13 +82,7 @@ def require_camera(
 
 
 def misses(side: Side, rig: RememberedCamera, held: Locks) -> tuple[LockMiss, ...]:
-    """Return the rig's locks that a camera does not have.
-
-    Args:
-        side: which of the rig's two cameras it is.
-        rig: the camera as the rig states it.
-        held: the controls that the camera is held at now.
-    """
+    """Return the rig's locks that a camera does not have."""
     now = {lock.value: value for lock, value in held}
     return tuple(
         LockMiss(side=side, control=name, wanted=wanted, present=now.get(name))

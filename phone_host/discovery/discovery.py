@@ -84,11 +84,7 @@ def find_board_and_say(state: Path, wait_s: float | None) -> str:
 
 
 def list_boards(state: Path) -> list[Found]:
-    """Look once everywhere, for some seconds; return each board that answers.
-
-    Args:
-        state: the folder in which the last board is remembered.
-    """
+    """Look once everywhere, for some seconds; return each board that answers."""
     announced = _announced()
     names = {board.link: board.name for board in announced}
     asked = tuple(dict.fromkeys((*_near(state), *names)))

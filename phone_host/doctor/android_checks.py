@@ -47,12 +47,7 @@ def check_camera(uri: str = "") -> Diagnostic:
 
 
 def check_usb(cards: Sequence[Card], serial_links: Sequence[str]) -> Diagnostic:
-    """Say what a USB cable can carry, and whether one does.
-
-    Args:
-        cards: network cards with an address.
-        serial_links: links over a serial port that are asked for.
-    """
+    """Say what a USB cable can carry, and whether one does."""
     if serial_links:
         problem = f"{serial_links[0]}: Android gives no app a serial port (without root)"
         return fail("usb", problem, f"use the cable as a network: --link tcp://{CABLE_BOARD}:5555")

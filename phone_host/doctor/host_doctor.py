@@ -88,10 +88,6 @@ class Question:
 def examine(question: Question, *, keeps: bool = True) -> Iterator[Diagnostic]:
     """Check this machine for a run.
 
-    Args:
-        question: what the run would use.
-        keeps: whether to look for an earlier check of the camera's images.
-
     Yields:
         The findings, in the order in which problems arise.
 

@@ -37,11 +37,6 @@ from phone_host.stream.receiver import Receiver
 def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
     """Say hello to a board as a host does, and leave again.
 
-    Args:
-        uri: URI of the link to the board.
-        wait_s: how long to wait for the board, s.
-        keys: folder of this host's key and the boards that it knows.
-
     Raises:
         TandemError: the link cannot be opened, or it failed.
     """

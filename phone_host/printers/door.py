@@ -94,11 +94,6 @@ class PrinterDoor(Protocol):
     def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
         """Print something. It returns when that has ended.
 
-        Args:
-            job: what.
-            wishes: of the user.
-            tell: called several times a second.
-
         Raises:
             TandemError: it cannot be printed, or the printer is gone.
         """

@@ -46,12 +46,7 @@ class Line(Protocol):
         """
 
     def offer(self, data: bytes, wait_s: float) -> bool:
-        """Send the last bytes, as many as the machine takes within the time; return whether it took all. It never raises.
-
-        Args:
-            data: to send.
-            wait_s: the longest time to wait for room, s.
-        """
+        """Send the last bytes, as many as the machine takes within the time; return whether it took all. It never raises."""
 
     def close(self) -> None:
         """Close it. May be called again. What was sent still goes out."""

@@ -27,12 +27,7 @@ UNREPORTED: Final = "the printer has answered the lines that switch heaters off,
 
 
 def ended_there(words: str, *, is_cold: bool) -> Diagnostic:
-    """Return what somebody has done at the printer.
-
-    Args:
-        words: for it.
-        is_cold: whether the printer reports that its heaters are off.
-    """
+    """Return what somebody has done at the printer."""
     return _failed(words, f"{'heaters, fan and motors are off' if is_cold else UNREPORTED}; start it again")
 
 
@@ -66,12 +61,7 @@ def long_sent(number: int) -> Diagnostic:
 
 
 def no_progress(sent: SentLine, attempts: Attempts) -> Diagnostic:
-    """Return that a line was sent so often in vain, or that line after line arrives and is not answered.
-
-    Args:
-        sent: the line under way.
-        attempts: how often it, and those before it, were sent again.
-    """
+    """Return that a line was sent so often in vain, or that line after line arrives and is not answered."""
     times = attempts.requests + attempts.timeouts
     if attempts.timeouts > sent.tries:  # lines before it were not answered, either
         return _failed(f"the printer takes the lines, and {attempts.timeouts} answers in a row were lost", _CABLE)

@@ -50,9 +50,6 @@ def is_gcode(what: Path) -> bool:
 def require_input(what: Path) -> None:
     """Refuse what does not exist, or cannot be read here, before a printer is asked or a slicer is looked for.
 
-    Args:
-        what: G-code, a scan's folder or a mesh file.
-
     Raises:
         DataError: there is no such file, or no model in the folder; or it is an archive, or binary G-code without a program that converts it.
     """

@@ -71,13 +71,6 @@ class ServerTalk:
     ) -> Answer:
         """Ask for something small.
 
-        Args:
-            method: of HTTP.
-            target: path and query.
-            headers: beside the usual ones.
-            body: to send.
-            patience_s: for the whole of it, the connection included, s.
-
         Raises:
             ServerLostError: there is no answer.
             UnavailableError: the answer is elsewhere, or beyond all measure.

@@ -9,11 +9,7 @@ from phone_host.sync.clock import ClockEstimate
 
 
 class UnpairedFrames:
-    """A taker that hands everything to a recorder.
-
-    Args:
-        recorder: writes.
-    """
+    """A taker that hands everything to a recorder."""
 
     def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder

@@ -154,10 +154,6 @@ class Course:
 def require_one_kind(own: CameraDescription, board: CameraDescription) -> None:
     """Refuse stills on one side beside a camera with a clock on the other: nothing says which images belong together.
 
-    Args:
-        own: this machine's camera.
-        board: the board's camera.
-
     Raises:
         SettingsError: one of the two shows images on demand, the other by its clock.
     """

@@ -105,12 +105,7 @@ def share_bar(what: str, then: str = "", console: Console | None = None) -> Iter
 
 
 class StepBar:
-    """A bar that counts units of work.
-
-    Args:
-        progress: the bar it is drawn in.
-        task: the bar's task.
-    """
+    """A bar that counts units of work."""
 
     def __init__(self, progress: Progress, task: TaskID) -> None:
         self._progress, self._task = progress, task

@@ -69,9 +69,6 @@ class RecordingSink:
 
     Attributes:
         failure: none: a disk that is full ends the recording, not the run.
-
-    Args:
-        recorder: writes.
     """
 
     def __init__(self, recorder: RecordingSwitch) -> None:

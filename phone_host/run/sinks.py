@@ -156,11 +156,7 @@ class SinkQueue(Generic[T]):
 
 
 class OneQueueSink:
-    """What sinks with one queue have in common.
-
-    Args:
-        queue: the sink's queue.
-    """
+    """What sinks with one queue have in common."""
 
     def __init__(self, queue: SinkQueue[Any]) -> None:
         self._queue = queue

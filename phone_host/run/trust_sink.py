@@ -115,12 +115,7 @@ class DoubtLog:
         self._due_ns = 0
 
     def look(self, now_ns: int, judge: Callable[[], Iterable[Diagnostic]]) -> None:
-        """Log what has changed, at most once a second.
-
-        Args:
-            now_ns: CLOCK_MONOTONIC, ns.
-            judge: returns the present concerns.
-        """
+        """Log what has changed, at most once a second."""
         if now_ns < self._due_ns:
             return
         self._due_ns = now_ns + _LOOK_NS

@@ -54,14 +54,7 @@ class _Still:
 
 
 class Renderer:
-    """Renders frames of one scene for one camera.
-
-    Args:
-        scene: bodies with their paths.
-        model: intrinsics of the camera, distortion included.
-        pose: where the camera stands.
-        look: its sensor.
-    """
+    """Renders frames of one scene for one camera."""
 
     def __init__(self, scene: Scene, model: CameraModel, pose: Pose, look: Look | None = None) -> None:
         self._scene = scene
@@ -80,9 +73,6 @@ class Renderer:
 
     def frame(self, t_s: float = 0.0) -> Image:
         """Render the image at time `t_s`.
-
-        Args:
-            t_s: seconds on the scene's clock.
 
         Returns:
             (H, W, 3) uint8 BGR. Equal arguments give equal bytes.

@@ -81,12 +81,7 @@ class _Ready:
 
 
 class _InUse:
-    """A correction, and the rectifiers that have it.
-
-    Args:
-        departure: how the right camera departs from the rig that was calibrated.
-        made: corrected rectifiers, by the calibrated ones.
-    """
+    """A correction, and the rectifiers that have it."""
 
     def __init__(self, departure: Departure, made: dict[Rectifier, Rectifier]) -> None:
         self.overlay, self._made = departure, made
@@ -197,11 +192,7 @@ class StereoCore:
         )
 
     def correct(self, departure: Departure) -> None:
-        """Rectify the next pairs with a corrected rig. Any thread may call it: the maps are made first, in this thread.
-
-        Args:
-            departure: how the right camera departs from the rig that was calibrated.
-        """
+        """Rectify the next pairs with a corrected rig. Any thread may call it: the maps are made first, in this thread."""
         known = {ready.rectifier for ready in list(self._kept.values()) if ready.rectifier is not None}
         self._in_use = _InUse(departure, {rectifier: rectifier.corrected(departure) for rectifier in known})
 

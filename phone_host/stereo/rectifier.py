@@ -28,9 +28,6 @@ class Rectifier:
         geometry: of the rectified pair.
         overlay: how the right camera departs from the rig that was calibrated.
 
-    Args:
-        rig: two calibrated cameras.
-
     Raises:
         DataError: see `rectify_rig`.
     """

@@ -53,12 +53,7 @@ class ZeroError:
 
 
 class ParameterErrors:
-    """The covariance of all parameters is known.
-
-    Args:
-        rig: with a finite covariance.
-        rectification: of that rig.
-    """
+    """The covariance of all parameters is known."""
 
     known: Final = Known.ALL
 

@@ -79,11 +79,7 @@ class _Known:
 
 
 class LinkChoice:
-    """Chooses among links in their order of preference.
-
-    Args:
-        links: number of links.
-    """
+    """Chooses among links in their order of preference."""
 
     def __init__(self, links: int) -> None:
         self._known = [_Known() for _ in range(links)]

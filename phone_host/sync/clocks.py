@@ -19,9 +19,6 @@ from phone_host.sync.hull import SKEW_CHANGE
 class LinkClocks:
     """Estimates one board clock over several links. A new boot of the board needs a new instance.
 
-    Args:
-        links: number of links.
-
     Attributes:
         estimate: the present estimate; None before the first echo, and while echoes contradict each other.
         since_ns: board's time of the first echo after the last doubt. Earlier stamps may come from a clock that has

@@ -51,11 +51,7 @@ class FifoSettings:
 
 
 class Fifo(Generic[T]):
-    """Keeps the order and never holds more than its depth.
-
-    Args:
-        settings: depth and overflow policy.
-    """
+    """Keeps the order and never holds more than its depth."""
 
     def __init__(self, settings: FifoSettings) -> None:
         self._settings = settings

@@ -93,11 +93,7 @@ Outcome = Paired[B, H] | BoardOrphan[B] | HostOrphan[H]
 
 
 class Pairing(Generic[B, H]):
-    """Pairs the nearest frames of two streams, in order.
-
-    Args:
-        settings: tolerance and periods.
-    """
+    """Pairs the nearest frames of two streams, in order."""
 
     def __init__(self, settings: PairingSettings) -> None:
         self._settings = settings

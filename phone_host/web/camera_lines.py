@@ -37,12 +37,7 @@ _MOST_SAID: Final = 256
 
 
 class SocketLine:
-    """One WebSocket, for threads that know no event loop.
-
-    Args:
-        socket: the WebSocket, prepared.
-        is_near: whether it comes from this machine.
-    """
+    """One WebSocket, for threads that know no event loop."""
 
     def __init__(self, socket: web.WebSocketResponse, *, is_near: bool) -> None:
         self._socket, self._loop = socket, asyncio.get_running_loop()

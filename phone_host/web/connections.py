@@ -28,12 +28,7 @@ _LED_TO_HTTPS: Final = (
 
 
 class Connection(asyncio.Protocol):
-    """Passes everything on to the HTTP protocol, and knows since when nothing is being answered.
-
-    Args:
-        inner: the HTTP protocol.
-        all_of_them: told when it begins and ends.
-    """
+    """Passes everything on to the HTTP protocol, and knows since when nothing is being answered."""
 
     def __init__(self, inner: asyncio.Protocol, all_of_them: "Connections") -> None:
         self._inner, self._all = inner, all_of_them
@@ -79,10 +74,6 @@ class Handshake(asyncio.Protocol):
     """Counts a connection from its first moment, while TLS is agreed; asyncio's own server would count it only afterwards.
 
     Who asks without TLS is led to https.
-
-    Args:
-        tls: what to agree.
-        all_of_them: makes the connection that follows.
     """
 
     def __init__(self, tls: ssl.SSLContext, all_of_them: "Connections") -> None:

@@ -89,12 +89,7 @@ class Viewer:
 
 
 class Viewers:
-    """All viewers, so that there are not too many and all can be closed.
-
-    Args:
-        hub: what there is.
-        limits: of their number and patience.
-    """
+    """All viewers, so that there are not too many and all can be closed."""
 
     def __init__(self, hub: Hub, limits: Limits) -> None:
         self._hub, self._limits = hub, limits

@@ -131,12 +131,7 @@ class _Estimate:
 
 
 class DriftWatch:
-    """Watches over one rig. Its times are seconds since the start of the run.
-
-    Args:
-        corrects: whether the user wants corrections.
-        start: the overlay in use from the start, of an earlier run.
-    """
+    """Watches over one rig. Its times are seconds since the start of the run."""
 
     def __init__(self, *, corrects: bool = True, start: Departure = AS_CALIBRATED) -> None:
         self._corrects = corrects

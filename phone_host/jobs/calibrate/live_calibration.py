@@ -120,10 +120,6 @@ class LiveCalibration:
     def run(self, stop: Callable[[], bool], watch: Callable[[], None]) -> Ended:
         """Take views until it is enough, `stop` returns True or a stream ends.
 
-        Args:
-            stop: called several times a second.
-            watch: called as often, for presenters.
-
         Returns:
             Why it ended.
 

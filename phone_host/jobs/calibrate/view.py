@@ -89,11 +89,7 @@ class Picture(Redrawn):
 
 
 class SnapshotValues:
-    """Hands on what guide.json holds, at most four times a second, and at the end.
-
-    Args:
-        take: takes the snapshot and the content of its guide.json.
-    """
+    """Hands on what guide.json holds, at most four times a second, and at the end."""
 
     def __init__(self, take: Callable[[GuideSnapshot, Mapping[str, object]], None]) -> None:
         self._take = take
@@ -111,9 +107,6 @@ class SnapshotValues:
 
 class SnapshotFiles(SnapshotValues):
     """Writes guide.json and guide.svg whenever something has changed, for whoever renders them.
-
-    Args:
-        folder: created if missing.
 
     Raises:
         OSError: it cannot be written to.
@@ -135,11 +128,7 @@ class SnapshotFiles(SnapshotValues):
 
 
 class Spoken:
-    """Hands new words to a voice.
-
-    Args:
-        voice: takes words, and returns at once.
-    """
+    """Hands new words to a voice."""
 
     def __init__(self, voice: Callable[[str], None]) -> None:
         self._voice, self._words = voice, ""
