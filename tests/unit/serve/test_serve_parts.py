@@ -225,13 +225,8 @@ def test_the_steps_lead_from_nothing_to_a_run_and_a_scan() -> None:
     ready = steps({**both, "calibration": "rig.yaml"}, checked="seen", pairs=2)
     assert [step.done for step in ready] == [True] * 5 + [False]
     assert ready[4].words == "the last run gave 2 pairs"
-<<<<<<< HEAD
     assert "slowly move the cameras" in ready[5].words
-    scanned = steps(Facts(choices=both, scan="3 of 3 pairs are in the model", has_scan=True))[5]
-=======
-    assert "move the cameras slowly" in ready[5].words
     scanned = steps(both, scan="3 of 3 pairs are in the model", has_scan=True)[5]
->>>>>>> 2ab06bec (serve: what is saved is one module; memory completes the state; two sources share a shelf)
     assert (scanned.done, scanned.words) == (True, "3 of 3 pairs are in the model")
     assert steps({**both, "rectified": "yes"}, is_running=True)[3].done
     assert steps(both, is_running=True)[4].words == "it runs"
