@@ -5,7 +5,6 @@ large images, they are packed some rows at a time. Text PLY by `numpy.savetxt` t
 Source: Greg Turk, "The PLY Polygon File Format", 1994.
 """
 
-import re
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -14,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.diagnostic import Diagnostic
-from common.errors import DataError
 from phone_host.model import CloudImage, Image
 from phone_host.native.library import Library, PackJob, native
 from phone_host.output.atomic import write_parts
@@ -29,11 +27,6 @@ _PROPERTIES = (
 )
 _TRIANGLE = np.dtype([("corners", "u1"), ("numbers", "<i4", 3)])
 _MOST_AT_ONCE = 4_000_000  # pixels, 60 MB of vertices; larger images go by strips, which take little memory
-_HEADER = re.compile(
-    rb"\Aply\nformat binary_little_endian 1\.0\n(?:comment [^\n]*\n)*element vertex (\d{1,10})\n"
-    + _PROPERTIES.encode()
-    + rb"end_header\n"
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,24 +208,3 @@ def _vertices(cloud: CloudImage, colours: Image, chosen: NDArray[np.bool_], axes
     for channel, name in enumerate(("blue", "green", "red")):
         vertices[name] = bgr[:, channel if colours.ndim == 3 else 0][places]
     return vertices
-
-
-def read_ply(path: Path) -> PointCloud:
-    """Read a PLY file in the form that `write_ply` writes.
-
-    Raises:
-        DataError: the file is missing, has another form, or its length does not match its header.
-    """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise DataError(f"{path} cannot be read ({error.strerror})", "give a PLY file that exists") from error
-    header = _HEADER.match(content)
-    if header is None:
-        raise DataError(f"{path} is not a coloured binary PLY file", "give a cloud.ply that this program wrote")
-    count = int(header.group(1))
-    if len(content) - header.end() != count * _VERTEX.itemsize:
-        raise DataError(f"{path} does not hold the {count} points its header names", "write the file again")
-    vertices = np.frombuffer(content, dtype=_VERTEX, count=count, offset=header.end())
-    points = np.stack([vertices[name] for name in "xyz"], axis=-1).astype(np.float32)
-    return PointCloud(points, np.stack([vertices[name] for name in ("red", "green", "blue")], axis=-1))

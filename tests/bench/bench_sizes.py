@@ -32,7 +32,6 @@ from rich.progress import Progress
 from rich.table import Table
 
 from phone_host.model import CameraModel, Image
-from phone_host.output.pfm import read_pfm
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.scene import (
     Look,
@@ -49,6 +48,7 @@ from phone_host.scene.scene import (
 from phone_host.stereo.rectify import rectify_rig
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
+from tests.support.point_files import read_pfm
 
 SIZES_PX: Final = ((640, 480), (1632, 1224), (4000, 3000), (8160, 6120))
 """0.3 megapixels: a webcam. 2, 12 and 50: photographs of phones."""

@@ -21,8 +21,6 @@ from phone_host.camera.factory import check_camera
 from phone_host.camera.jpegs import MAX_IMAGE_BYTES, JpegStream
 from phone_host.camera.jpegs import Whole as WholeImage
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.output.pfm import read_pfm
-from phone_host.output.ply import read_ply
 from phone_host.output.rig_yaml import read_rig
 from phone_host.settings import check
 from phone_host.stereo.images import decode_file, examine
@@ -250,27 +248,17 @@ def settings_seeds() -> list[bytes]:
     return [text, b'log_level = "debug"\ntolerance = nan\n', b"fifo = '1'\n", b'calibration = """\na"""\n']
 
 
-def results(data: bytes) -> None:
-    """Disparity maps, point clouds and lists of peers from a disk. Expected: their content, or a one-line DataError."""
+def peers(data: bytes) -> None:
+    """Lists of peers from a disk. Expected: their content, or a one-line DataError."""
     path = Path(_FOLDER.name) / "peers.json"
     path.write_bytes(data)
     path.chmod(0o600)
     folder = KeyFolder(Path(_FOLDER.name))
-    for read in (lambda: read_pfm(path), lambda: read_ply(path), folder.peers):
-        try:
-            read()
-        except DataError as error:
-            is_one_line(error)
+    try:
+        folder.peers()
+    except DataError as error:
+        is_one_line(error)
 
 
-def results_seeds() -> list[bytes]:
-    """Valid files."""
-    properties = b"".join(b"property float %c\n" % axis for axis in b"xyz")
-    colours = b"".join(b"property uchar %s\n" % name for name in (b"red", b"green", b"blue"))
-    header = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\n" + properties + colours + b"end_header\n"
-    return [
-        b"Pf\n2 1\n-1\n" + bytes(8),
-        b"Pf\n1 1\n1.0\n" + bytes(4),
-        header,
-        b'[{"name": "a", "key": "b", "address": ""}]',
-    ]
+def peers_seeds() -> list[bytes]:
+    return [b'[{"name": "a", "key": "b", "address": ""}]']

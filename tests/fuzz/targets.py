@@ -26,5 +26,5 @@ TARGETS: dict[str, Target] = {
     "rigfiles": Target("calibrations of other programs", rig_files.rig_files, rig_files.rig_files_seeds, 8192, 0.005),
     "settings": Target("settings files", inputs.settings, inputs.settings_seeds, 2048, 0.005),
     "recording": Target("recordings", inputs.recordings, inputs.recordings_seeds, 16_384, 0.005),
-    "results": Target("files of results and peers", inputs.results, inputs.results_seeds, 2048, 0.005),
+    "peers": Target("lists of peers", inputs.peers, inputs.peers_seeds, 2048, 0.005),
 }

@@ -14,10 +14,10 @@ import pytest
 from common.errors import SettingsError, UnavailableError
 from phone_host.api import open_scanner
 from phone_host.model import CameraModel, Disparity, RectifiedPair, Rig
-from phone_host.output.ply import read_ply
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, number_of, saved_numbers, write_film
+from tests.support.point_files import read_ply
 from tests.support.programs import board, until
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from phone_host.model import CameraModel, Rig
-from phone_host.output.pfm import read_pfm
 from phone_host.scene.scene import demo_scene, render, rig_poses
+from tests.support.point_files import read_pfm
 from tests.support.programs import board, host, program
 
 GIVEN = ["--rectified", "--focal", "260", "--baseline", "100mm"]

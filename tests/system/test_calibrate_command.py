@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from phone_host.calibration.target.corners import Board, find_corners
-from phone_host.output.ply import read_ply
 from phone_host.output.rig_yaml import read_rig
 from phone_host.stereo.images import read_image
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import project
 from tests.support.boards import poses, render_pair
 from tests.support.html import Page
+from tests.support.point_files import read_ply
 from tests.support.rigs import unlike_rig
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from phone_host.output.ply import read_ply
+from tests.support.point_files import read_ply
 from tests.support.programs import host, ledgers, lines, until
 
 

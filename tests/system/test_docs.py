@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.output.pfm import read_pfm
 from tests.docs.commands import ROOT, Command, documented
 from tests.docs.run import is_long, needs_hardware, prepare, run
 from tests.support.planes import noise
+from tests.support.point_files import read_pfm
 
 _QUICK = [command for command in documented() if not needs_hardware(command) and not is_long(command)]
 _SHIFT_PX = 7

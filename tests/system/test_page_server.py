@@ -17,7 +17,6 @@ from multidict import CIMultiDict
 
 from common.errors import TakenError, UnavailableError
 from phone_host.geometry.se3 import SE3
-from phone_host.output.ply import read_ply
 from phone_host.scan.patches import Patches
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
@@ -27,6 +26,7 @@ from phone_host.web.settings import PageSettings
 from phone_host.web.source import Command, Do
 from tests.support.page_source import PageSource
 from tests.support.plane_films import plane_view, texture
+from tests.support.point_files import read_ply
 from tests.support.programs import until
 from tests.support.served_page import Start, next_pair, start, viewer  # noqa: F401 - start is a fixture
 from tests.support.stereo_pages import GEOMETRY

@@ -21,7 +21,6 @@ from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.run_rules import concerns
 from phone_host.model import CameraModel, Rig
 from phone_host.output.cameras_json import read_cameras
-from phone_host.output.pfm import read_pfm
 from phone_host.output.rig_yaml import write_rig
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
@@ -33,6 +32,7 @@ from phone_host.stereo.rectify import rectify_rig
 from tests.support.lying_board import board_of
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, write_film
 from tests.support.planes import plane
+from tests.support.point_files import read_pfm
 from tests.support.programs import board, host
 
 LEFT = CameraIdentity("uvcvideo", "HD Pro Webcam C920", "A1")

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 
 from phone_host.model import Image
-from phone_host.output.pfm import read_pfm
-from phone_host.output.ply import read_ply
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
+from tests.support.point_files import read_pfm, read_ply
 from tests.support.rigs import unlike_rig
 
 _SHIFT_PX = 12

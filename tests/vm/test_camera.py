@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from phone_host.output.pfm import read_pfm
+from tests.support.point_files import read_pfm
 from tests.support.programs import ledgers, until
 from tests.vm.conftest import READOUT_MS
 from tests.vm.guest import UNIT, Guest

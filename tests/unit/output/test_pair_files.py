@@ -15,9 +15,8 @@ from phone_host.model import Processed, RectifiedPair, StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.depth_png import depth_mm
 from phone_host.output.pair_files import RUN_FILES, STEREO_FILES, PairFile, available, write_pair
-from phone_host.output.pfm import read_pfm, read_xyz
-from phone_host.output.ply import read_ply
 from phone_host.stereo.reproject import project, reproject
+from tests.support.point_files import read_pfm, read_ply, read_xyz
 
 _GEOMETRY = StereoGeometry(focal_px=50, baseline_m=0.1, cx_px=9.5, cy_px=7.5, doffs_px=2)
 

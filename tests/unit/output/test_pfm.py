@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from common.errors import DataError
 from phone_host.model import Disparity
 from phone_host.output.axes import Axes
-from phone_host.output.pfm import read_pfm, read_xyz, write_pfm, write_xyz
+from phone_host.output.pfm import write_pfm, write_xyz
+from tests.support.point_files import read_pfm, read_xyz
 
 
 def test_file_holds_header_bottom_row_first_little_endian_and_infinity(tmp_path: Path) -> None:
@@ -37,31 +37,6 @@ def test_round_trip(tmp_path_factory: pytest.TempPathFactory, disparity: Dispari
     path = tmp_path_factory.mktemp("pfm") / "d.pfm"
     write_pfm(path, disparity)
     np.testing.assert_array_equal(read_pfm(path), disparity)
-
-
-def test_big_endian_is_read(tmp_path: Path) -> None:
-    """A positive scale means big endian."""
-    path = tmp_path / "d.pfm"
-    path.write_bytes(b"Pf\n1 2\n1.0\n" + struct.pack(">2f", 7.0, float("inf")))
-    np.testing.assert_array_equal(read_pfm(path), np.array([[np.nan], [7.0]], dtype=np.float32))
-
-
-@pytest.mark.parametrize(
-    "content",
-    [b"", b"P5\n2 2\n255\n", b"PF\n1 1\n-1\n" + bytes(12), b"Pf\n2 2\n-1\n" + bytes(15), b"Pf\n2 2\n0\n" + bytes(16)],
-)
-def test_bad_files_are_named(tmp_path: Path, content: bytes) -> None:
-    """A file that is not a whole one-channel PFM is refused by name."""
-    path = tmp_path / "bad.pfm"
-    path.write_bytes(content)
-    with pytest.raises(DataError, match=r"bad\.pfm"):
-        read_pfm(path)
-
-
-def test_missing_file_is_named(tmp_path: Path) -> None:
-    """A missing file is a DataError, not an OSError."""
-    with pytest.raises(DataError, match=r"none\.pfm"):
-        read_pfm(tmp_path / "none.pfm")
 
 
 def test_a_write_that_fails_half_way_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
@@ -105,13 +80,3 @@ def test_an_image_of_points_is_read_by_numpy_alone_and_by_opencv(tmp_path: Path)
     by_opencv = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED))[..., ::-1]
     np.testing.assert_array_equal(by_opencv, cloud)
     np.testing.assert_array_equal(read_xyz(path), cloud)
-
-
-def test_one_kind_of_pfm_is_not_taken_for_the_other(tmp_path: Path) -> None:
-    """Who reads points from a disparity map, or the reverse, is told how many channels it has."""
-    write_pfm(tmp_path / "d.pfm", np.ones((2, 2), np.float32))
-    write_xyz(tmp_path / "p.pfm", np.ones((2, 2, 3), np.float32))
-    with pytest.raises(DataError, match=r"d\.pfm is a PFM of one channel"):
-        read_xyz(tmp_path / "d.pfm")
-    with pytest.raises(DataError, match=r"p\.pfm is a PFM of three channels"):
-        read_pfm(tmp_path / "p.pfm")

@@ -19,9 +19,9 @@ from phone_host.model import RectifiedPair, Result
 from phone_host.output.axes import Axes
 from phone_host.output.listed import LIST
 from phone_host.output.move_up import STAGED
-from phone_host.output.ply import read_ply
 from phone_host.run.file_sink import FileSink
 from phone_host.run.sinks import FunctionSink, SinkQueue
+from tests.support.point_files import read_ply
 from tests.support.results import result
 
 PATIENCE_S = 60.0

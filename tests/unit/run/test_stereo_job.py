@@ -14,7 +14,6 @@ from common.errors import DataError, SettingsError, UnavailableError
 from phone_host.diagnostics.codes import Code
 from phone_host.model import Image, StereoGeometry
 from phone_host.output.axes import Axes
-from phone_host.output.pfm import read_pfm, read_xyz
 from phone_host.report.stereo_report import Size
 from phone_host.run.file_pairs import FilePairs
 from phone_host.run.stereo_job import run_stereo
@@ -22,6 +21,7 @@ from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.view_files import pair_files
+from tests.support.point_files import read_pfm, read_xyz
 
 _SHIFTS = {2: 6, 7: 9, 11: 12}  # px, by the number in the name
 
