@@ -3,8 +3,8 @@
 import math
 import os
 import platform
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import zmq
@@ -12,12 +12,27 @@ import zmq
 from common import now
 from common.words import counted
 from phone_host.accounts.delays import DELAYS, STAGES, Spread
-from phone_host.bench.analysis import Analysis, Checked, Errors, InterfaceFit, WhatIf, regime_of, statistics_of
+from phone_host.bench.analysis import Analysis, Checked, Errors, InterfaceFit, regime_of, statistics_of
 from phone_host.bench.cases import BOARD_SETS, Interface
 from phone_host.bench.delay_fit import DelayFit
 from phone_host.bench.prediction import Figures, Unknown
 from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
-from phone_host.output.json_text import json_number
+from phone_host.report.bench_result import (
+    BenchRun,
+    BothErrors,
+    DelayBenchResult,
+    DelaySpread,
+    FittedLink,
+    NotRun,
+    NotRunSetting,
+    Predicted,
+    PredictionErrors,
+    RegimeTold,
+    RunCounts,
+    RunFigures,
+    UncertaintySpread,
+)
+from phone_host.report.json_result import ABSENT, Absent, json_values
 from phone_host.sync.fifo import FifoSettings
 
 PERCENTILES: Final = ("p50", "p95", "p99", "max")
@@ -65,22 +80,25 @@ def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) 
 
 def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> dict[str, object]:
     """Make the object of delay-bench.json."""
-    return {
-        "command": "delay-bench",
-        "recording": under.recording or None,
-        "machine": under.machine,
-        "date": under.date,
-        "matcher": under.matcher,
-        "measured_per_run_s": under.seconds,
-        "left_out_warm_up_s": WARM_UP_S,
-        "fifo": f"{under.fifo.depth}:{under.fifo.overflow.value}",
-        "runs": [_run(result, under.fifo) for result in results],
-        "interfaces": [_interface(one) for one in analysis.fits],
-        "predictions": [_checked(one) for one in analysis.checked],
-        "prediction_errors": {"held_out": _errors(analysis.held_out), "queues_alone": _errors(analysis.queues)},
-        "not_run_settings": [_what_if(one) for one in analysis.what_ifs],
-        "not_run": [{"link": str(interface), "reason": reason} for interface, reason in under.not_run],
-    }
+    return json_values(
+        DelayBenchResult(
+            recording=under.recording or None,
+            machine=under.machine,
+            date=under.date,
+            matcher=under.matcher,
+            measured_per_run_s=under.seconds,
+            left_out_warm_up_s=WARM_UP_S,
+            fifo=f"{under.fifo.depth}:{under.fifo.overflow.value}",
+            runs=tuple(_run(result, under.fifo) for result in results),
+            interfaces=tuple(_interface(one) for one in analysis.fits),
+            predictions=tuple(_checked(one) for one in analysis.checked),
+            prediction_errors=BothErrors(_errors(analysis.held_out), _errors(analysis.queues)),
+            not_run_settings=tuple(
+                NotRunSetting(one.interface, one.setting, *_said(one.figures)) for one in analysis.what_ifs
+            ),
+            not_run=tuple(NotRun(str(interface), reason) for interface, reason in under.not_run),
+        )
+    )
 
 
 def losses(result: CaseResult) -> dict[str, int]:
@@ -125,58 +143,54 @@ def few_pairs_words(results: Sequence[CaseResult]) -> str:
     return f"{least.case.interface} from only {counted(pairs, 'pair')}: run it longer (--seconds {seconds})"
 
 
-def _run(result: CaseResult, fifo: FifoSettings) -> dict[str, object]:
+def _run(result: CaseResult, fifo: FifoSettings) -> BenchRun:
     case, statistics, regime = result.case, statistics_of(result), regime_of(result, fifo)
-    uncertainty = statistics.spread("uncertainty")
-    return {
-        "link": case.interface.link,
-        "emulated": case.interface.profile.name if case.interface.profile is not None else None,
-        "width_px": case.size.width_px,
-        "height_px": case.size.height_px,
-        "jpeg_quality_percent": None if case.quality_percent == BOARD_SETS else case.quality_percent,
-        "camera_rate_hz": case.rate_hz,
-        "pair_rate_hz": json_number(result.pairs_per_second),
-        "measured_s": result.measured_s,
-        "measured_pairs": len(result.ledgers),
-        "mean_frame_bytes": round(sum(ledger.bytes for ledger in result.ledgers) / max(1, len(result.ledgers))),
-        "least_frame_bytes": min((ledger.bytes for ledger in result.ledgers), default=0),
-        "delays": {name: _spread(statistics.spread(name)) for name in DELAYS},
-        "stages": {name: _spread(statistics.spread(name)) for name in STAGES},
-        "time_skew": _spread(statistics.spread("time_skew")),
-        "clock_uncertainty": {f"{key}_us": json_number(value / 1e3) for key, value in percentiles(uncertainty).items()},
-        "clock_uncertainty_at_end_us": json_number(result.uncertainty_ns / 1e3),
-        "clock_bound_at_end_us": json_number(result.bound_ns / 1e3),
-        "regime": {"regime": regime.regime.value, "sentence": regime.sentence, "remedies": list(regime.remedies)},
-        "whole_run": _counts(result),
-        "line": None if result.relay is None else asdict(result.relay),
-    }
+    spread = statistics.spread
+    return BenchRun(
+        link=case.interface.link,
+        emulated=case.interface.profile.name if case.interface.profile is not None else None,
+        width_px=case.size.width_px,
+        height_px=case.size.height_px,
+        jpeg_quality_percent=None if case.quality_percent == BOARD_SETS else case.quality_percent,
+        camera_rate_hz=case.rate_hz,
+        pair_rate_hz=result.pairs_per_second,
+        measured_s=result.measured_s,
+        measured_pairs=len(result.ledgers),
+        mean_frame_bytes=round(sum(ledger.bytes for ledger in result.ledgers) / max(1, len(result.ledgers))),
+        least_frame_bytes=min((ledger.bytes for ledger in result.ledgers), default=0),
+        delays={name: DelaySpread(*_in(1e6, spread(name))) for name in DELAYS},
+        stages={name: DelaySpread(*_in(1e6, spread(name))) for name in STAGES},
+        time_skew=DelaySpread(*_in(1e6, spread("time_skew"))),
+        clock_uncertainty=UncertaintySpread(*_in(1e3, spread("uncertainty"))),
+        clock_uncertainty_at_end_us=result.uncertainty_ns / 1e3,
+        clock_bound_at_end_us=result.bound_ns / 1e3,
+        regime=RegimeTold(regime.regime.value, regime.sentence, regime.remedies),
+        whole_run=_counts(result),
+        line=result.relay,
+    )
 
 
-def _counts(result: CaseResult) -> dict[str, object]:
+def _counts(result: CaseResult) -> RunCounts:
     board, counts, link = result.board, result.counts, result.link
     received = sum(account.received for account in link.sessions)
     lost = sum(account.lost for account in link.sessions)
-    return {
-        "grabbed_frames": board.grabbed,
-        "dropped_on_board_frames": dict(board.dropped),
-        "sent_frames": board.sent,
-        "lost_on_link_frames": lost,
-        "under_way_at_end_frames": board.sent - received - lost,
-        "received_frames": received,
-        "before_clock_frames": link.no_clock,
-        "disbelieved_frames": {reason.value: count for reason, count in link.disbelieved.items()},
-        "orphaned_frames": dict(counts.board_orphans),
-        "held_at_end_frames": counts.held_board,
-        "paired_pairs": counts.paired,
-        "dropped_in_fifo_pairs": counts.dropped,
-        "undecodable_pairs": result.undecodable,
-        "processed_pairs": result.processed,
-        "not_processed_at_end_pairs": counts.paired - counts.dropped - result.undecodable - result.processed,
-    }
-
-
-def _spread(spread: Spread) -> dict[str, float | None]:
-    return {f"{key}_ms": json_number(value / 1e6) for key, value in percentiles(spread).items()}
+    return RunCounts(
+        grabbed_frames=board.grabbed,
+        dropped_on_board_frames=dict(board.dropped),
+        sent_frames=board.sent,
+        lost_on_link_frames=lost,
+        under_way_at_end_frames=board.sent - received - lost,
+        received_frames=received,
+        before_clock_frames=link.no_clock,
+        disbelieved_frames={reason.value: count for reason, count in link.disbelieved.items()},
+        orphaned_frames=dict(counts.board_orphans),
+        held_at_end_frames=counts.held_board,
+        paired_pairs=counts.paired,
+        dropped_in_fifo_pairs=counts.dropped,
+        undecodable_pairs=result.undecodable,
+        processed_pairs=result.processed,
+        not_processed_at_end_pairs=counts.paired - counts.dropped - result.undecodable - result.processed,
+    )
 
 
 def percentiles(spread: Spread) -> dict[str, float]:
@@ -190,61 +204,54 @@ def percentiles(spread: Spread) -> dict[str, float]:
     }
 
 
-def _interface(one: InterfaceFit) -> dict[str, object]:
+def _in(unit_ns: float, spread: Spread) -> Iterator[float]:
+    return (value / unit_ns for value in percentiles(spread).values())
+
+
+def _interface(one: InterfaceFit) -> FittedLink:
     fit: DelayFit = one.fit
-    finite = {
-        "latency_ms": fit.latency_ns / 1e6,
-        "latency_low_ms": fit.latency_low_ns / 1e6,
-        "latency_high_ms": fit.latency_high_ns / 1e6,
-        "slope_ns_per_byte": fit.ns_per_byte,
-        "slope_low_ns_per_byte": fit.slope_low,
-        "slope_high_ns_per_byte": fit.slope_high,
-        "typical_error_ms": fit.typical_error_ns / 1e6,
-    }
-    rates = {
-        "rate_bytes_per_s": fit.bytes_per_s,
-        "rate_low_bytes_per_s": fit.least_bytes_per_s,
-        "rate_high_bytes_per_s": fit.most_bytes_per_s,
-    }
-    # JSON has no number for an infinite rate; the slope beside it says what was found.
-    numbers = {key: json_number(value) for key, value in (finite | rates).items()}
-    return {"link": str(one.interface), "fitted_frames": fit.points, **numbers}
+    return FittedLink(
+        link=str(one.interface),
+        fitted_frames=fit.points,
+        latency_ms=fit.latency_ns / 1e6,
+        latency_low_ms=fit.latency_low_ns / 1e6,
+        latency_high_ms=fit.latency_high_ns / 1e6,
+        slope_ns_per_byte=fit.ns_per_byte,
+        slope_low_ns_per_byte=fit.slope_low,
+        slope_high_ns_per_byte=fit.slope_high,
+        typical_error_ms=fit.typical_error_ns / 1e6,
+        rate_bytes_per_s=fit.bytes_per_s,
+        rate_low_bytes_per_s=fit.least_bytes_per_s,
+        rate_high_bytes_per_s=fit.most_bytes_per_s,
+    )
 
 
-def _errors(errors: Errors) -> dict[str, object]:
-    return {
-        "predicted_runs": errors.runs,
-        "pair_rate_median_percent": json_number(100.0 * errors.rate),
-        "pair_rate_worst_percent": json_number(100.0 * errors.worst_rate),
-        "end_to_end_p50_median_percent": json_number(100.0 * errors.end_to_end),
-        "end_to_end_p50_worst_percent": json_number(100.0 * errors.worst_end_to_end),
-    }
+def _errors(errors: Errors) -> PredictionErrors:
+    return PredictionErrors(
+        predicted_runs=errors.runs,
+        pair_rate_median_percent=100.0 * errors.rate,
+        pair_rate_worst_percent=100.0 * errors.worst_rate,
+        end_to_end_p50_median_percent=100.0 * errors.end_to_end,
+        end_to_end_p50_worst_percent=100.0 * errors.worst_end_to_end,
+    )
 
 
-def _checked(one: Checked) -> dict[str, object]:
-    head: dict[str, object] = {"link": str(one.case.interface), "images": one.case.images}
-    head["measured"] = _figures(one.measured)
-    head["queues_alone"] = _said(one.queues)["predicted"]
-    return head | _said(one.predicted)
+def _checked(one: Checked) -> Predicted:
+    queues, _ = _said(one.queues)
+    return Predicted(str(one.case.interface), one.case.images, _figures(one.measured), queues, *_said(one.predicted))
 
 
-def _what_if(one: WhatIf) -> dict[str, object]:
-    return {"link": one.interface, "setting": one.setting} | _said(one.figures)
+def _said(predicted: Figures | Unknown) -> tuple[RunFigures | None, str | Absent]:
+    return (None, predicted.reason) if isinstance(predicted, Unknown) else (_figures(predicted), ABSENT)
 
 
-def _said(predicted: Figures | Unknown) -> dict[str, object]:
-    if isinstance(predicted, Unknown):
-        return {"predicted": None, "reason": predicted.reason}
-    return {"predicted": _figures(predicted)}
-
-
-def _figures(figures: Figures) -> dict[str, object]:
-    return {
-        "pair_rate_hz": json_number(figures.pairs_per_s),
-        "lost_percent": json_number(100.0 * figures.lost_share),
-        "propagation_p50_ms": json_number(figures.propagation_p50_ns / 1e6),
-        "queuing_p95_ms": json_number(figures.queuing_p95_ns / 1e6),
-        "starvation_p50_ms": json_number(figures.starvation_p50_ns / 1e6),
-        "end_to_end_p50_ms": json_number(figures.end_to_end_p50_ns / 1e6),
-        "end_to_end_p95_ms": json_number(figures.end_to_end_p95_ns / 1e6),
-    }
+def _figures(figures: Figures) -> RunFigures:
+    return RunFigures(
+        pair_rate_hz=figures.pairs_per_s,
+        lost_percent=100.0 * figures.lost_share,
+        propagation_p50_ms=figures.propagation_p50_ns / 1e6,
+        queuing_p95_ms=figures.queuing_p95_ns / 1e6,
+        starvation_p50_ms=figures.starvation_p50_ns / 1e6,
+        end_to_end_p50_ms=figures.end_to_end_p50_ns / 1e6,
+        end_to_end_p95_ms=figures.end_to_end_p95_ns / 1e6,
+    )

@@ -20,10 +20,14 @@ from phone_host.report.calibration_report import CalibrationReport, Judged
 from phone_host.stereo.view_files import ViewFiles, is_unread_photograph
 
 REFUSED: Final = "run and stereo refuse this calibration unless --use-rejected-rig is given"
-
 _SHOWN = 3
 _WHOLE_METRES = 10.0
 """From here on a limit in tenths of a metre says nothing."""
+
+
+def earlier_words(name: str) -> str:
+    """Say what the earlier rig is called now, behind a sentence on the new one that was written; empty if it was not moved."""
+    return f"; the earlier one is now {name}" if name else ""
 
 
 def rejections(rejected: tuple[Rejected, ...]) -> list[str]:
@@ -165,8 +169,3 @@ def _written(report: CalibrationReport, out: Path) -> list[str]:
     if report.verdict is Verdict.REJECT:
         rows.append(REFUSED)
     return rows
-
-
-def earlier_words(name: str) -> str:
-    """Say what the earlier rig is called now, behind a sentence on the new one that was written; empty if it was not moved."""
-    return f"; the earlier one is now {name}" if name else ""

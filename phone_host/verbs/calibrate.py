@@ -10,7 +10,7 @@ from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.output_folders import require_alone
 from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
-from phone_host.report.calibration_json import import_values, report_values
+from phone_host.report.calibration_result import calibration_values, import_values
 
 EXAMPLES = """  phone-host calibrate --live --link tcp://192.168.7.2:5555 --camera v4l2:/dev/video0 --square 25mm --out rig.yaml    # says what to show
   phone-host calibrate left/ right/ --square 25mm --out rig.yaml    # the board's size is found in the pictures
@@ -45,7 +45,7 @@ def run(request: CalibrateRequest) -> int:
         live = take_views(request, asked)
     made = calibrate_pictures(request, asked, live)
     if request.as_json:
-        print(json_text(report_values(made.report)))
+        print(json_text(calibration_values(made.report)))
     else:
         say(made.lines)
     if isinstance(made.report.result, DataError):

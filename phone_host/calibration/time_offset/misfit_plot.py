@@ -3,8 +3,7 @@
 import numpy as np
 
 from phone_host.calibration.time_offset.shots import Measured
-from phone_host.svg.plot_parts import axes, frame, standalone, svg, ticks_below
-from phone_host.svg.plot_scale import span
+from phone_host.svg.plot_parts import axes, frame, standalone, svg, ticks_below, wider
 
 _SIZE_PX = (720, 320)
 
@@ -13,7 +12,7 @@ def misfit_svg(measured: Measured) -> str:
     """Draw the misfit over the offset, with the answer and its uncertainty."""
     use = np.isfinite(measured.misfits)
     offsets_ms, misfits = measured.offsets_s[use] * 1e3, measured.misfits[use]
-    across, up = frame(_SIZE_PX, span(offsets_ms), span(misfits))
+    across, up = frame(_SIZE_PX, wider(offsets_ms, 0.02), wider(misfits, 0.05))
     found_ms, doubt_ms = measured.offset.offset_ns / 1e6, measured.offset.uncertainty_ns / 1e6
     low_px, high_px, here_px = (across.px(found_ms + way * doubt_ms) for way in (-1, 1, 0))
     doubt = (

@@ -30,9 +30,9 @@ from phone_host.output.json_text import json_text
 from phone_host.output.report_owner import PAGE, REPORT
 from phone_host.output.rig_files.imported import Imported, RigKind, export_texts, import_rig
 from phone_host.output.rig_yaml import read_rig_views
-from phone_host.report.calibration_json import import_values
 from phone_host.report.calibration_lines import REFUSED, earlier_words
 from phone_host.report.calibration_report import Exported, ImportReport
+from phone_host.report.calibration_result import import_values
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
 

@@ -31,7 +31,6 @@ from phone_host.jobs.calibrate.earlier import (
     with_earlier_cameras,
 )
 from phone_host.jobs.calibrate.other_programs import export_lines, write_exports
-from phone_host.jobs.calibrate.page import series_of_failure, series_of_rig, with_rectified, write_page
 from phone_host.jobs.calibrate.request import EXPORTS, CalibrateRequest
 from phone_host.jobs.calibrate.rig_file import replace_rig, require_own
 from phone_host.jobs.output_folders import (
@@ -45,9 +44,10 @@ from phone_host.jobs.picture_pairs import GivenPictures, given_pictures
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.output.report_owner import PAGE, REPORT
-from phone_host.report.calibration_json import report_values
 from phone_host.report.calibration_lines import pairing_notes, passed_over_notes, summary
 from phone_host.report.calibration_report import CalibrationReport, Judged
+from phone_host.report.calibration_result import calibration_values
+from phone_host.report.calibration_shown import series_of_failure, series_of_rig, with_rectified, write_page
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files, passed_over
@@ -172,7 +172,7 @@ def calibrate_pictures(
                 *([] if live is None else live.as_lines(request)),
             ]
         write_page(place, page, out.name)
-        write_text(place / REPORT, json_text(report_values(report), indent=2) + "\n")
+        write_text(place / REPORT, json_text(calibration_values(report), indent=2) + "\n")
     return Made(report, [*lines, known.as_line(), *summary(report, out), *more])
 
 

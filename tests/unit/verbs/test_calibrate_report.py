@@ -16,8 +16,8 @@ from phone_host.calibration.solve.verdict import Assessment
 from phone_host.model import Verdict
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import Imported, RigKind
-from phone_host.report.calibration_json import import_values, report_values
 from phone_host.report.calibration_report import Exported, ImportReport, Judged
+from phone_host.report.calibration_result import calibration_values, import_values
 from tests.support.calibration_series import calibration, calibration_report
 from tests.support.rigs import unlike_rig
 
@@ -51,9 +51,9 @@ def test_every_key_is_documented() -> None:
         live=before_board("show", 25, 1.0),
     )
     for values in (
-        report_values(whole),
-        report_values(calibration_report(Judged(calibration(), _USABLE))),
-        report_values(calibration_report(DataError("nothing is seen", "light it"))),
+        calibration_values(whole),
+        calibration_values(calibration_report(Judged(calibration(), _USABLE))),
+        calibration_values(calibration_report(DataError("nothing is seen", "light it"))),
         import_values(ImportReport(imported=Imported(rig=unlike_rig(), kind=RigKind.ROS, files=(), notes=()))),
     ):
         assert set(values) <= listed
@@ -62,21 +62,21 @@ def test_every_key_is_documented() -> None:
 
 def test_a_cause_is_told_with_its_turn() -> None:
     """Name, sentence and remedy; degrees, millimetres and the pair from which on the cameras stood otherwise. A hint comes before the sentence; no cause is null."""
-    values = report_values(calibration_report(Judged(calibration(), _USABLE, _turned())))["cause"]
+    values = calibration_values(calibration_report(Judged(calibration(), _USABLE, _turned())))["cause"]
     assert (values["name"], values["sentence"], values["remedy"]) == ("rig not stiff", "they turned", "tighten it")
     assert values["explained_px"] is None
     assert values["turned"]["course"] == "at once"
     assert values["turned"]["turn_deg"][0] == pytest.approx(math.degrees(0.001), abs=1e-4)
     assert (values["turned"]["from_pair"], values["turned"]["depth_at_1_m_mm"]) == ("5", 12.0)
     turned = Judged(calibration(), _USABLE, _turned(), "the right images are turned")
-    assert report_values(calibration_report(turned))["cause"]["sentence"] == "the right images are turned"
-    assert report_values(calibration_report(Judged(calibration(), _USABLE)))["cause"] is None
+    assert calibration_values(calibration_report(turned))["cause"]["sentence"] == "the right images are turned"
+    assert calibration_values(calibration_report(Judged(calibration(), _USABLE)))["cause"] is None
 
 
 def test_no_rig_is_a_rejected_one() -> None:
     """Problem and remedy are those of the error; no pair is used, and there are no figures."""
     report = calibration_report(DataError("nothing is seen", "light it"))
-    values = report_values(report)
+    values = calibration_values(report)
     assert (report.verdict, report.remedy) == (Verdict.REJECT, "light it")
     assert (values["verdict"], values["problem"], values["remedy"]) == ("reject", "nothing is seen", "light it")
     assert values["pairs"]["used"] == 0
