@@ -139,7 +139,7 @@ def cut_cloud(cloud: CloudImage, geometry: StereoGeometry, limits: DepthLimits) 
 def is_wide(geometry: StereoGeometry, width_px: int, height_px: int) -> bool:
     """Return whether an image reaches more than 45 degrees to a side; else no |x| or |y| is larger than z."""
     sides = (geometry.cx_px, width_px - 1 - geometry.cx_px, geometry.cy_px, height_px - 1 - geometry.cy_px)
-    return max(sides) > geometry.focal_px
+    return bool(max(sides) > geometry.focal_px)  # also for numbers of numpy, as a program may give them
 
 
 def float32_below(value: float) -> np.float32:

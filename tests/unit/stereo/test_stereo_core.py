@@ -1,6 +1,6 @@
 """The stereo core's stages one by one, and what the core and the matchers refuse before they start."""
 
-from dataclasses import astuple, replace
+from dataclasses import asdict, astuple, replace
 
 import cv2
 import numpy as np
@@ -39,6 +39,15 @@ def test_a_shift_becomes_a_depth(name: MatcherName) -> None:
     inner = depth_m[12:-12, 28:-12]
     assert np.nanmedian(inner) == pytest.approx(5.0, rel=0.01)
     assert np.isfinite(inner).mean() > 0.9
+
+
+def test_a_geometry_may_be_of_numpys_numbers() -> None:
+    """As a program reads it from a matrix."""
+    geometry = StereoGeometry(**{name: np.float64(value) for name, value in asdict(GEOMETRY).items()})
+    core = StereoCore(MatchSettings(MatcherName.TANDEM, 16), geometry=geometry)
+    cloud = core.compute(*shifted(10), lambda: 0).cloud
+    assert cloud is not None
+    assert np.nanmedian(cloud[12:-12, 28:-12, 2]) == pytest.approx(5.0, rel=0.01)
 
 
 def test_a_core_that_rectifies_has_the_rigs_geometry() -> None:
