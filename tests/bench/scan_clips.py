@@ -50,17 +50,20 @@ class Street:
     baseline_m: float
 
 
+def street_pairs(data: Path) -> list[tuple[Image, Image]]:
+    """The rectified images of KITTI_sequence_1, left and right."""
+    folder = data / "kitti_odometry_clips" / "KITTI_sequence_1"
+    files = (sorted((folder / name).iterdir()) for name in ("image_l", "image_r"))
+    return [(_grey(left), _grey(right)) for left, right in zip(*files, strict=True)]
+
+
 def street(data: Path) -> Street:
     """KITTI_sequence_1: 24 rectified pairs."""
     folder = data / "kitti_odometry_clips" / "KITTI_sequence_1"
     left, right = np.loadtxt(folder / "calib.txt").reshape(-1, 3, 4)[:2]
-    geometry = StereoGeometry(
-        focal_px=left[0, 0], baseline_m=-right[0, 3] / left[0, 0], cx_px=left[0, 2], cy_px=left[1, 2]
-    )
-    pairs = [
-        tuple(_grey(path) for path in both)
-        for both in zip(sorted((folder / "image_l").iterdir()), sorted((folder / "image_r").iterdir()), strict=True)
-    ]
+    focal_px, cx_px, cy_px = (float(left[at]) for at in ((0, 0), (0, 2), (1, 2)))
+    geometry = StereoGeometry(focal_px=focal_px, baseline_m=-float(right[0, 3]) / focal_px, cx_px=cx_px, cy_px=cy_px)
+    pairs = street_pairs(data)
     truth = tuple(
         SE3(rows[:, :3], rows[:, 3]) for rows in np.loadtxt(folder / "poses.txt").reshape(-1, 3, 4)[: len(pairs)]
     )

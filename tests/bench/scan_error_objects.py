@@ -1,9 +1,14 @@
-"""Things on which the stated error of a scan is measured: those of the object benchmark, a plaster bunny, a bottle and a rock."""
+"""Things on which the stated error of a scan is measured: those of the object benchmark, a plaster bunny, a bottle, a rock, a vase and a castle. And rigs."""
 
+import math
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
-from phone_host.scene.object_scene import ObjectScene, Setting, mat_body, object_rig
+import numpy as np
+
+from phone_host.model import CameraModel, Rig
+from phone_host.scene.object_scene import LOOKS, ObjectScene, Setting, mat_body, object_rig
 from phone_host.scene.objects import OBJECTS
 from phone_host.scene.scene_model import Body, Box, Frustum, Sphere, Texture, rotation
 from phone_host.scene.solid import Solid
@@ -58,16 +63,57 @@ def _rock() -> Solid:
     )
 
 
-ERROR_OBJECTS: Final = MappingProxyType({**OBJECTS, "bunny": _bunny, "bottle": _bottle, "rock": _rock})
+def _vase() -> Solid:
+    """Wide above a narrow foot, painted. No constant was fitted to it, nor to the castle."""
+    return Solid(
+        (
+            Body("foot", Frustum(0.026, 0.016, 0.02), (0.0, 0.0, 0.01), _LABEL),
+            Body("belly", Frustum(0.016, 0.038, 0.05), (0.0, 0.0, 0.045), _LABEL),
+            Body("shoulder", Frustum(0.038, 0.02, 0.03), (0.0, 0.0, 0.085), _LABEL),
+        )
+    )
 
 
-def error_scene(name: str, setting: Setting) -> ObjectScene:
+def _castle() -> Solid:
+    """Towers around a block: edges, gaps and tips."""
+    towers = [
+        part
+        for number, (x, y) in enumerate(((0.032, 0.026), (-0.032, 0.026), (-0.032, -0.026), (0.032, -0.026)))
+        for part in (
+            Body(f"tower {number}", Frustum(0.013, 0.013, 0.07), (x, y, 0.035), _STONE),
+            Body(f"roof {number}", Frustum(0.017, 0.004, 0.02), (x, y, 0.08), _GLASS),
+        )
+    ]
+    return Solid((Body("keep", Box((0.064, 0.052, 0.045)), (0.0, 0.0, 0.0225), _STONE), *towers))
+
+
+def _wide_rig() -> Rig:
+    """Two cameras alike, of fewer pixels, a shorter focal length and a wider baseline."""
+    matrix = np.array([[420.0, 0.0, 262.0], [0.0, 420.0, 188.0], [0.0, 0.0, 1.0]])
+    camera = CameraModel(
+        width_px=520, height_px=390, matrix=matrix, distortion=np.array([-0.1, 0.02, 0.0003, -0.0002, 0.0])
+    )
+    turn = rotation((0.0, 1.0, 0.1), math.radians(4.0))
+    return Rig(left=camera, right=camera, R_right_left=turn, t_right_left_m=-turn @ np.array([0.09, 0.001, 0.0]))
+
+
+ERROR_OBJECTS: Final = MappingProxyType(
+    {**OBJECTS, "bunny": _bunny, "bottle": _bottle, "rock": _rock, "vase": _vase, "castle": _castle}
+)
+ERROR_RIGS: Final = ("usual", "wide")
+"""wide: 520x390 px, f = 420 px, 90 mm apart, sensors of more noise, JPEG 75. No constant was fitted to it."""
+
+
+def error_scene(name: str, setting: Setting, rig: str = "usual") -> ObjectScene:
     """Return one of them on a table.
 
     Args:
         name: of `ERROR_OBJECTS`.
         setting: how it is seen.
+        rig: of `ERROR_RIGS`; wide brings sensors of its own.
     """
-    return ObjectScene(
-        ERROR_OBJECTS[name](), object_rig(setting.size), setting, mat_body() if setting.has_mat else None
-    )
+    cameras = object_rig(setting.size)
+    if rig == "wide":
+        looks = (replace(LOOKS[0], noise_sigma=4.0, blur_px=0.8), replace(LOOKS[1], noise_sigma=3.5, blur_px=0.5))
+        cameras, setting = _wide_rig(), replace(setting, looks=looks, jpeg_quality=75)
+    return ObjectScene(ERROR_OBJECTS[name](), cameras, setting, mat_body() if setting.has_mat else None)

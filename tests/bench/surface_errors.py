@@ -25,7 +25,7 @@ _KD_TREE: Final[dict[str, bool | int | float | str]] = {"algorithm": 4}
 _EXACT: Final[dict[str, bool | int | float | str]] = {"checks": -1}
 
 
-class _Surface:
+class Surface:
     """Points of a mesh, their normals, and which is nearest."""
 
     def __init__(self, mesh: Mesh) -> None:
@@ -45,6 +45,13 @@ class _Surface:
         numbers = np.asarray(found)[:, 0]
         return self.points_m[numbers] - points_m, self.normals[numbers]
 
+    def distances_m(self, points_m: Floats, aside_m: float) -> Floats:
+        """Return how far points (N, 3), m, lie from the plane through the nearest one, or from that itself where it is farther aside than `aside_m`."""
+        ways, normals = self.nearest(points_m)
+        off, away = np.abs((ways * normals).sum(axis=1)), np.linalg.norm(ways, axis=1)
+        aside = np.sqrt(np.maximum(away**2 - off**2, 0))
+        return np.asarray(np.where(aside < aside_m, off, away), np.float64)
+
 
 def surface_errors(clip: Clip, poses: Sequence[SE3], settings: VolumeSettings, threads: int) -> tuple[float, float]:
     """Compare the surface of a clip's views at some poses with that at the given ones.
@@ -58,16 +65,14 @@ def surface_errors(clip: Clip, poses: Sequence[SE3], settings: VolumeSettings, t
     Returns:
         Mean distance, and that which 95 % of the points keep, mm: to the surface through the nearest point, where that is no farther than a voxel aside.
     """
-    given, found = (_Surface(_mesh(clip, each, settings, threads)) for each in (clip.truth, poses))
-    points = _registered(given, found.points_m, _by_places(poses, clip.truth)).apply(found.points_m)
-    ways, normals = given.nearest(points)
-    off, away = np.abs((ways * normals).sum(axis=1)), np.linalg.norm(ways, axis=1)
-    aside = np.sqrt(np.maximum(away**2 - off**2, 0))
-    distances = np.where(aside < settings.voxel_m, off, away)
+    given, found = (Surface(mesh_at(clip, each, settings, threads)) for each in (clip.truth, poses))
+    points = registered(given, found.points_m, _by_places(poses, clip.truth)).apply(found.points_m)
+    distances = given.distances_m(points, settings.voxel_m)
     return 1e3 * float(distances.mean()), 1e3 * float(np.percentile(distances, 95))
 
 
-def _mesh(clip: Clip, poses: Sequence[SE3], settings: VolumeSettings, threads: int) -> Mesh:
+def mesh_at(clip: Clip, poses: Sequence[SE3], settings: VolumeSettings, threads: int) -> Mesh:
+    """Return the surface that a clip's views give at some poses."""
     volume = Volume(settings, threads)
     for view, pose in zip(clip.views, poses, strict=True):
         volume.fuse(view, pose)
@@ -82,7 +87,7 @@ def _by_places(found: Sequence[SE3], truth: Sequence[SE3]) -> SE3:
     return SE3(turn, there.mean(axis=0) - turn @ here.mean(axis=0))
 
 
-def _registered(given: _Surface, points_m: Floats, start: SE3) -> SE3:
+def registered(given: Surface, points_m: Floats, start: SE3) -> SE3:
     """Return the motion that lays points on a surface, point to plane."""
     some, motion = points_m[:: max(len(points_m) // _POINTS, 1)], start
     for most_m, steps in _ROUNDS:
