@@ -9,12 +9,25 @@ import cv2
 import numpy as np
 from playwright.sync_api import sync_playwright
 
+from common import now
 from common.ledger import StageTimes
 from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.model import Processed, RectifiedPair
+from phone_host.output.axes import Axes
+from phone_host.report.scan_report import scan_verdict
+from phone_host.run.scan_work import finished_scan
+from phone_host.scan.factory import scan_for
+from phone_host.scan.mat import USUAL_MAT, parse_mat
+from phone_host.scan.patches import Patches
+from phone_host.scan.scan_wanted import ScanWanted
+from phone_host.scene.object_scene import Setting, object_scene
+from phone_host.stereo.core import StereoCore
+from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.match import MatchSettings
+from phone_host.stereo.rectifier import Rectifier
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
-from phone_host.web.source import Activity, StepName
+from phone_host.web.source import Activity, ScanState, StepName
 from tests.support.boards import BOARD, render_pair
 from tests.support.rigs import small_rig
 from tests.web.conftest import CHROMIUM, LAPTOP, PHONE
@@ -58,6 +71,32 @@ def shown_board() -> tuple[Processed, GuideSnapshot]:
     )
 
 
+def scanned(views: int) -> tuple[Patches, ScanState]:
+    """A rendered thing, scanned on its mat from all around: its surface, and what the page says of it."""
+    scene = object_scene("speckled", Setting(views=views))
+    core = StereoCore(MatchSettings(disparities=256), Rectifier(scene.rig), wanted=DepthWanted(search_from_m=0.25))
+    scan = scan_for(ScanWanted(mat=parse_mat(USUAL_MAT)))
+    for number in range(views):
+        view = scene.view(number)
+        scan.take(str(number), float(number), core.compute(view.left, view.right, now.monotonic_ns))
+    finished = finished_scan(scan, matcher="tandem", axes=Axes.MAT)
+    assert scan.settings is not None
+    patches, shown = Patches(1), finished.model.with_unseen(finished.report.unseen)
+    patches.become(shown.mesh, scan.settings.voxel_m, shown.seen)
+    verdict, words = scan_verdict(finished.report)
+    files = ("model.ply", "trajectory.txt", "report.json", "index.html")
+    folder = "/home/me/.local/share/tandemscan/scans/2026-11-29-104500"
+    return patches, ScanState(
+        words=words,
+        level=verdict.value,
+        pairs=views,
+        fused=scan.fused,
+        folder=folder,
+        files=files,
+        options={"mat": "usual"},
+    )
+
+
 def main() -> None:
     """Take them all."""
     board, guide = shown_board()
@@ -71,6 +110,7 @@ def main() -> None:
         laptop = browser.new_page(viewport=LAPTOP)
         phone = browser.new_page(viewport=PHONE, color_scheme="dark", device_scale_factor=1.5, has_touch=True)
         for page in (laptop, phone):
+            page.set_default_timeout(180_000)  # ms; rendering keeps the machine busy
             page.goto(server.url)
         show(phone, "board")
         keep(phone, "board")
@@ -108,6 +148,13 @@ def main() -> None:
             phone.check("input[value=cloud]", force=True)
             phone.wait_for_timeout(2500)
             keep(phone, "phone-cloud")
+        program.patches, program.scan = scanned(24)
+        program.axes = "mat"
+        program.change(activity=Activity.IDLE, begun=3)
+        show(laptop, "scan")
+        laptop.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
+        laptop.wait_for_timeout(2500)
+        keep(laptop, "scan")
         browser.close()
     server.stop()
 
