@@ -125,7 +125,9 @@ def main() -> None:
         program.emit()
         laptop.wait_for_timeout(900)
         keep(laptop, "calibration")
-        program.change(activity=Activity.RUNNING, guide=None, done=set(StepName), settings=SETTINGS, begun=2)
+        program.change(
+            activity=Activity.RUNNING, guide=None, done=set(StepName) - {StepName.SCAN}, settings=SETTINGS, begun=2
+        )
         program.pairs = rendered(8)
         with playing(program, 6):
             for page in (laptop, phone):
@@ -150,7 +152,7 @@ def main() -> None:
             keep(phone, "phone-cloud")
         program.patches, program.scan = scanned(24)
         program.axes = "mat"
-        program.change(activity=Activity.IDLE, begun=3)
+        program.change(activity=Activity.IDLE, done=set(StepName), begun=3)
         show(laptop, "scan")
         laptop.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
         laptop.wait_for_timeout(2500)
