@@ -95,7 +95,7 @@ class StreamLink:
         self.kind = kind
         self._dials = side is LinkEnd.DIALLER
         self.dialled = {lane: lane.name.encode() for lane in Lane} if self._dials else {}
-        self._open_line = open_line
+        self.open_line = open_line
         self._line: Line | None = None
         self._opening = Opening()
         self._reopen_ns = 0
@@ -206,7 +206,7 @@ class StreamLink:
             return
         self._reopen_ns = now_ns + _REOPEN_NS
         with suppress(UnavailableError):
-            self._begin(self._open_line())
+            self._begin(self.open_line())
 
     def _begin(self, opened: Line | Opening) -> None:
         """Register the open line, or the descriptor on which the opening one waits."""

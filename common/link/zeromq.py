@@ -132,6 +132,7 @@ class ZeroMqListener(_AlwaysReady):
     """The side that binds.
 
     Attributes:
+        router: its socket.
         due_ns: when `receive` must be called even if nothing is readable.
 
     Args:
@@ -154,13 +155,13 @@ class ZeroMqListener(_AlwaysReady):
             check_folder(path, trusted_users(owner))
             free_path(path)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._socket = self._context.socket(zmq.ROUTER)
-        _configure(self._socket, _most_bytes(board=board))
-        self._guard = _guarded(self._context, self._socket, keys, own) if keys and own else None
-        self._socket.setsockopt(zmq.ROUTER_MANDATORY, 1)  # report a vanished host instead of swallowing its frames
+        self.router = self._context.socket(zmq.ROUTER)
+        _configure(self.router, _most_bytes(board=board))
+        self._guard = _guarded(self._context, self.router, keys, own) if keys and own else None
+        self.router.setsockopt(zmq.ROUTER_MANDATORY, 1)  # report a vanished host instead of swallowing its frames
         before = os.umask(0o177)  # an ipc path is for its owner only
         try:
-            self._gate = gate.bind(self._socket, address)
+            self._gate = gate.bind(self.router, address)
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
             raise explained(address, error, "stop what listens there, or choose another with --link") from None
@@ -172,8 +173,8 @@ class ZeroMqListener(_AlwaysReady):
             except UnavailableError:
                 self._context.destroy(linger=0)
                 raise
-        self.endpoint = plain_endpoint(self._socket.getsockopt_string(zmq.LAST_ENDPOINT))
-        self._inbox = Inbox(self._socket)
+        self.endpoint = plain_endpoint(self.router.getsockopt_string(zmq.LAST_ENDPOINT))
+        self._inbox = Inbox(self.router)
         self._door: Door | None = None
         self.due_ns = _NEVER
 
@@ -211,7 +212,7 @@ class ZeroMqListener(_AlwaysReady):
         if self._door:
             self._door.answer()
         self._note_due()
-        inbox, sock = self._inbox, self._socket
+        inbox, sock = self._inbox, self.router
         while inbox.may_have and inbox.invites():
             try:
                 connection = sock.recv(_NOW)
@@ -270,7 +271,7 @@ class ZeroMqDialer(_AlwaysReady):
             check_socket(self._path, self._trusted)
         self.dialled = {lane: lane.name.encode() for lane in Lane}
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._connections: dict[bytes, Dialled] = {}
+        self.connections: dict[bytes, Dialled] = {}
         self.due_ns = _NEVER
         for lane in (Lane.FRAMES, Lane.CONTROL):
             sock = self._context.socket(zmq.DEALER)
@@ -284,13 +285,13 @@ class ZeroMqDialer(_AlwaysReady):
             except zmq.ZMQError as error:
                 self._context.destroy(linger=0)
                 raise explained(address, error, "give --link tcp://HOST:PORT or ipc://PATH") from None
-            self._connections[self.dialled[lane]] = connection
-        self._lanes = tuple(self._connections.items())
+            self.connections[self.dialled[lane]] = connection
+        self._lanes = tuple(self.connections.items())
 
     @property
     def pollables(self) -> Sequence[Any]:
         """Both sockets and their monitors' descriptors. Only `receive` calls a monitor, so no other call consumes its news."""
-        return tuple(item for known in self._connections.values() for item in (known.inbox, known.news))
+        return tuple(item for known in self.connections.values() for item in (known.inbox, known.news))
 
     def receive(self) -> Iterator[Incoming]:
         """Return all packets that have arrived, frames first, then the broken connections: a peer's last words precede its end.
@@ -359,11 +360,11 @@ class ZeroMqDialer(_AlwaysReady):
 
     def send(self, connection: bytes, header: bytes, payload: Buffer) -> SendResult:
         """Send a packet. Before the peer is there, the result is FULL (ZMQ_IMMEDIATE)."""
-        return _send(self._connections[connection].inbox, b"", header, payload)
+        return _send(self.connections[connection].inbox, b"", header, payload)
 
     def close(self) -> None:
         """Let accepted packets leave, then close."""
-        for known in self._connections.values():
+        for known in self.connections.values():
             known.inbox.socket.disable_monitor()
         self._context.destroy(linger=_LINGER_MS)
 

@@ -220,7 +220,7 @@ class Joiner:
     """The receiving half of one side: takes units, returns whole packets. Keeps at most one packet per lane, and only the part that has come."""
 
     def __init__(self) -> None:
-        self._under_way: dict[Lane, _Assembly] = {}
+        self.under_way: dict[Lane, _Assembly] = {}
         self._broken = 0
 
     @property
@@ -235,7 +235,7 @@ class Joiner:
             The packet that it completes.
         """
         lane = _LANE_OF[unit.kind]
-        assembly = self._under_way.pop(lane, None)
+        assembly = self.under_way.pop(lane, None)
         if unit.first:
             self._broken += assembly is not None
             assembly = _begin(unit)
@@ -251,7 +251,7 @@ class Joiner:
         if not unit.last:
             assembly.data += unit.body
             assembly.next_number = (unit.number + 1) % _NUMBERS
-            self._under_way[lane] = assembly
+            self.under_way[lane] = assembly
             return None
         if assembly.data:
             assembly.data += unit.body

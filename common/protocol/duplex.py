@@ -46,6 +46,9 @@ class DuplexCounts:
 class Duplex:
     """One end of a line that may lose, add and spoil bytes.
 
+    Attributes:
+        joiner: holds what has come of a packet that is not whole.
+
     Args:
         side: which end.
         number: random, below 2^32.
@@ -61,7 +64,7 @@ class Duplex:
         self._told_garbage_bytes = 0
         self._past = DuplexCounts()
         self._cutter = Cutter(side, frame_bytes)
-        self._joiner = Joiner()
+        self.joiner = Joiner()
 
     @property
     def is_up(self) -> bool:
@@ -86,7 +89,7 @@ class Duplex:
     @property
     def counts(self) -> DuplexCounts:
         """What went wrong so far."""
-        broken, abandoned = self._past.broken + self._joiner.broken, self._past.abandoned + self._cutter.abandoned
+        broken, abandoned = self._past.broken + self.joiner.broken, self._past.abandoned + self._cutter.abandoned
         return DuplexCounts(self._deframer.garbage_bytes, broken, abandoned)
 
     @property
@@ -146,7 +149,7 @@ class Duplex:
         counts = self.counts
         self._past = DuplexCounts(0, counts.broken, counts.abandoned)
         self._cutter = Cutter(self._side, self._frame_bytes)
-        self._joiner = Joiner()
+        self.joiner = Joiner()
 
     def _accept(self, units: list[Unit], now_ns: int) -> list[Whole | Change]:
         events: list[Whole | Change] = []
@@ -160,7 +163,7 @@ class Duplex:
             else:
                 if unit.kind is UnitKind.FRAMES:
                     self._cutter.acknowledge(unit.number)
-                whole = self._joiner.add(unit)
+                whole = self.joiner.add(unit)
                 if whole is not None:
                     events.append(whole)
         if self._deframer.garbage_bytes != self._told_garbage_bytes:

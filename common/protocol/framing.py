@@ -94,11 +94,15 @@ def unit_parts(side: LinkEnd, unit: Unit) -> tuple[bytes, Buffer, bytes]:
 
 
 class Deframer:
-    """Finds the peer's units."""
+    """Finds the peer's units.
+
+    Attributes:
+        rest: bytes of a unit that is not complete yet.
+    """
 
     def __init__(self, peer: LinkEnd) -> None:
         self._marker = bytes((peer.value,))
-        self._rest = b""
+        self.rest = b""
         self._garbage_bytes = 0
 
     @property
@@ -109,7 +113,7 @@ class Deframer:
     @property
     def partial(self) -> bool:
         """Whether a unit has begun that is not yet complete."""
-        return bool(self._rest)
+        return bool(self.rest)
 
     def feed(self, data: bytes) -> list[Unit]:
         """Take bytes in chunks of any size.
@@ -117,11 +121,11 @@ class Deframer:
         Returns:
             The units completed by these bytes. Their bodies are views, not copies.
         """
-        if self._rest:
-            data = self._rest + data
+        if self.rest:
+            data = self.rest + data
         units: list[Unit] = []
         at = self._scan(data, units)
-        self._rest = data[at:]
+        self.rest = data[at:]
         return units
 
     def give_up(self) -> list[Unit]:
@@ -130,7 +134,7 @@ class Deframer:
         Returns:
             Whole units that had been taken for its body.
         """
-        data, self._rest = self._rest, b""
+        data, self.rest = self.rest, b""
         units: list[Unit] = []
         at = 0
         while at < len(data):
@@ -141,8 +145,8 @@ class Deframer:
 
     def reset(self) -> None:
         """Forget an incomplete unit because a new stream begins."""
-        self._garbage_bytes += len(self._rest)
-        self._rest = b""
+        self._garbage_bytes += len(self.rest)
+        self.rest = b""
 
     def _scan(self, data: bytes, units: list[Unit]) -> int:
         """Collect whole units; return the position of the first byte that still needs more bytes behind it."""

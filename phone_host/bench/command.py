@@ -131,7 +131,7 @@ def _tell(options: argparse.Namespace, results: Sequence[CaseResult], under: Con
     if options.json:
         print(json.dumps(report))
     else:
-        _print(results, under, analysis)
+        print_results(results, under, analysis)
     if options.out is None:
         return
     files = {
@@ -176,7 +176,7 @@ def _write(out: Path, files: dict[str, str]) -> None:
         ) from None
 
 
-def _print(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
+def print_results(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> None:
     """Print a table for each kind of images, stage by stage, with the interfaces below each other."""
     print(fitted(f"{under.machine}, {under.date}, matcher {under.matcher}"))
     if sentence := result_sentence(most_compared(results)):

@@ -114,7 +114,7 @@ def answering(links: Sequence[str]) -> list[str]:
 
 def _near(state: Path) -> tuple[str, ...]:
     """Return the links to try before the network: the last board's, this machine's, those of a cable and of a board's own Wi-Fi."""
-    return tuple(dict.fromkeys((*_last(state), *_sockets(), *_NEAR)))
+    return tuple(dict.fromkeys((*remembered(state), *_sockets(), *_NEAR)))
 
 
 def _sockets() -> list[str]:
@@ -126,7 +126,8 @@ def _sockets() -> list[str]:
     return []
 
 
-def _last(state: Path) -> list[str]:
+def remembered(state: Path) -> list[str]:
+    """Return the link of the last board, as `remember` has kept it; none, or none that is one: empty."""
     try:
         with opened_folder(state) as folder:
             text = read_file(folder, state / _LAST_FILE, _MOST_BYTES)[0].decode().strip()

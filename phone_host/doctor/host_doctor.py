@@ -56,7 +56,7 @@ from phone_host.native.library import VARIABLE, native
 
 _CONNECT_S: Final = 2.0
 
-_FURTHER_MODULES: Final = ("aiohttp", "rich", "segno", "yaml", *(() if is_android() else ("zeroconf",)), "cryptography")
+FURTHER_MODULES: Final = ("aiohttp", "rich", "segno", "yaml", *(() if is_android() else ("zeroconf",)), "cryptography")
 """Modules of every installation of the host whose versions the doctor does not judge (pyproject.toml, dependencies)."""
 
 
@@ -98,7 +98,7 @@ def examine(question: Question, *, keeps: bool = True) -> Iterator[Diagnostic]:
     yield check_python(sys.version_info[:3], sys.platform)
     if is_android():
         yield check_phone(_phone())
-    packages = [*map(check_package, _packages()), *missing_packages(_FURTHER_MODULES)]
+    packages = [*map(check_package, _packages()), *missing_packages(FURTHER_MODULES)]
     yield from packages
     yield native_finding()
     works = all(finding.severity is not Severity.FAIL for finding in packages)

@@ -171,12 +171,12 @@ def build(folder: Path, extra: Sequence[str] = ()) -> Built:
     compiler = find_compiler()
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
-        sets, left_out = _usable_sets(compiler, scratch)
+        sets, left_out = usable_sets(compiler, scratch)
         objects: list[Path] = []
         made = []
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
             jobs = [
-                (isa, [pool.submit(_compiled, compiler, scratch, source, isa, extra) for source in PER_ISA])
+                (isa, [pool.submit(compiled, compiler, scratch, source, isa, extra) for source in PER_ISA])
                 for isa in sets
             ]
             for isa, parts in jobs:
@@ -189,7 +189,7 @@ def build(folder: Path, extra: Sequence[str] = ()) -> Built:
                 else:
                     made.append(isa.name)
         known = [f"-DTANDEM_HAS_{isa.upper()}=1" for isa in made] + [f'-DTANDEM_SOURCES="{sources_digest()}"']
-        objects += [_compiled(compiler, scratch, source, _plain(sets), [*known, *extra]) for source in ONCE]
+        objects += [compiled(compiler, scratch, source, _plain(sets), [*known, *extra]) for source in ONCE]
         library = scratch / LIBRARY_FILE
         _run([*compiler, *extra, "-o", str(library), *map(str, objects), *_LINK])
         path = folder / LIBRARY_FILE
@@ -235,7 +235,7 @@ def main() -> int:
     return 0
 
 
-def _usable_sets(compiler: Sequence[str], scratch: Path) -> tuple[tuple[Isa, ...], list[str]]:
+def usable_sets(compiler: Sequence[str], scratch: Path) -> tuple[tuple[Isa, ...], list[str]]:
     """Return the sets of the compiler's target whose flags it knows, and the others, each with its reason."""
     macros = _run([*compiler, "-dM", "-E", "-x", "c", os.devnull])
     names = {line.split()[1] for line in macros.splitlines() if line.startswith("#define ")}
@@ -258,7 +258,8 @@ def _plain(sets: Sequence[Isa]) -> Isa:
     return Isa("", sets[0].flags if sets else ())
 
 
-def _compiled(compiler: Sequence[str], scratch: Path, source: str, isa: Isa, extra: Sequence[str]) -> Path:
+def compiled(compiler: Sequence[str], scratch: Path, source: str, isa: Isa, extra: Sequence[str]) -> Path:
+    """Compile one source for one instruction set; return the object file."""
     path = scratch / f"{Path(source).stem}_{isa.name}.o"
     named = (f"-DTANDEM_ISA={isa.name}", f"-DTANDEM_IS_{isa.name.upper()}=1") if isa.name else ()
     level = _SCALAR_LEVEL if isa.name == _SCALAR.name else ()

@@ -144,10 +144,10 @@ class DriftKeeper:
     def _tell(self) -> None:
         """Log what has changed since it last looked."""
         for change in self._watch.take_news():
-            _say(change, self._watch.drift)
+            log_change(change, self._watch.drift)
 
 
-def _say(change: Change, drift: Drift) -> None:
+def log_change(change: Change, drift: Drift) -> None:
     """Log one change."""
     values = {"at_s": f"{change.at_s:.1f}"} | _turn_values(change.departure)
     match change.kind:

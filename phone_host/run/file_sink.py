@@ -141,6 +141,9 @@ class _Lines:
 class FileSink:
     """Writes into one folder, or nowhere. Lines and pairs have separate queues, so that neither waits for the other.
 
+    Attributes:
+        listed: the folder; None: nothing is written, or no longer.
+
     Args:
         folder: created if missing; None to write nothing.
         save_every: save every Nth pair, starting with the first; 0 for none.
@@ -167,21 +170,21 @@ class FileSink:
         self._unsaved_pairs = self._lost_lines = 0
         self._missing: tuple[str, ...] = ()
         self._saved_pairs, self._stays = 0, ""
-        self._own: ListedFolder | None = None
+        self.listed: ListedFolder | None = None
         self._file = -1
         if folder is None:
             return
         self._folder = folder
         try:
-            self._own = ListedFolder(folder, NAMES, command=command)
-            self._own.open()
-            if self._own.earlier:
-                self._own.stage()
-            self._own.add("report.json")
-            self._file = self._own.create("delays.jsonl")
+            self.listed = ListedFolder(folder, NAMES, command=command)
+            self.listed.open()
+            if self.listed.earlier:
+                self.listed.stage()
+            self.listed.add("report.json")
+            self._file = self.listed.create("delays.jsonl")
             if settings is not None:
-                self._own.add("settings.json")
-                self._own.write_text("settings.json", json_text(settings, indent=1) + "\n")
+                self.listed.add("settings.json")
+                self.listed.write_text("settings.json", json_text(settings, indent=1) + "\n")
         except OSError as error:
             self._let_go()
             raise UnavailableError(
@@ -199,12 +202,12 @@ class FileSink:
 
     def await_place(self, number: int) -> None:
         """See Sink."""
-        if self._own is not None and self._is_due(number):
+        if self.listed is not None and self._is_due(number):
             self._pair_queue.await_place()
 
     def offer(self, result: Result) -> None:
         """See Sink."""
-        if self._own is None:
+        if self.listed is None:
             return
         self._lost_lines += not self._line_queue.offer(result.ledger)
         if self._is_due(result.number):
@@ -212,7 +215,7 @@ class FileSink:
 
     def finish(self) -> None:
         """See Sink."""
-        if self._own is not None:
+        if self.listed is not None:
             self._pair_queue.finish()
             self._line_queue.finish()
             self._lines.flush()
@@ -220,7 +223,7 @@ class FileSink:
     @property
     def failure(self) -> Exception | None:
         """See Sink."""
-        return None if self._own is None else self._line_queue.failure or self._pair_queue.failure
+        return None if self.listed is None else self._line_queue.failure or self._pair_queue.failure
 
     @property
     def accounts(self) -> tuple[SinkAccount, ...]:
@@ -243,7 +246,7 @@ class FileSink:
     @property
     def place(self) -> Path | None:
         """The folder in which the files of the run lie until it is closed; None: nothing is written."""
-        return None if self._own is None else self._own.place
+        return None if self.listed is None else self.listed.place
 
     @property
     def unwritten(self) -> Unwritten:
@@ -274,7 +277,7 @@ class FileSink:
             overlay: content of overlay.yaml; empty: none.
             replaces_earlier: whether the run is whole, so that an earlier run's results may be replaced by it.
         """
-        if self._own is None:
+        if self.listed is None:
             return
         texts = {
             "report.json": json_text(report, indent=1) + "\n",
@@ -285,44 +288,44 @@ class FileSink:
         try:
             self.finish()
             troubles = self._write_last({name: text for name, text in texts.items() if text})
-            if not troubles and self.complete and (replaces_earlier or not self._own.is_staged):
+            if not troubles and self.complete and (replaces_earlier or not self.listed.is_staged):
                 troubles = self._published()
             if troubles:
                 self._missing = tuple(troubles)
                 error = next(iter(troubles.values()))
                 self._of_report.begins(error, ",".join(troubles), "make room and run again")
-            if self._own.is_staged:
+            if self.listed.is_staged:
                 self._keep_earlier()
         finally:
             self._let_go()
 
     def abandon(self) -> None:
         """Release the folder of a run that does not begin, and leave nothing there that a later run takes for its results."""
-        if self._own is not None:
+        if self.listed is not None:
             self.finish()
-            if not self._own.is_staged:
+            if not self.listed.is_staged:
                 for name in ("settings.json", "delays.jsonl"):
                     with suppress(OSError):
-                        remove_result(name, self._own.descriptor)
+                        remove_result(name, self.listed.descriptor)
             self._let_go()
 
     def _published(self) -> dict[str, OSError]:
         """Let the results take the place of the earlier ones; return what failed."""
-        assert self._own is not None
+        assert self.listed is not None
         try:
-            self._own.publish()
+            self.listed.publish()
         except OSError as error:
             return {"report.json": error}
         return {}
 
     def _keep_earlier(self) -> None:
         """Leave an earlier run's results where they are, and what this one has saved beside them."""
-        assert self._own is not None
+        assert self.listed is not None
         why, where = "this run has no pair", {}
         if self._saved_pairs or (self.complete and self._lines.are_begun):
             why = "this run ended early" if self.complete else "this run is not whole"
             with suppress(OSError):
-                where["of_this_run"] = str(self._own.keep_staged())
+                where["of_this_run"] = str(self.listed.keep_staged())
         _LOG.warning(event("earlier_results_stay", folder=self._folder, **where, why=why))
         saved = "".join(f", and what could be written is in {place}" for place in where.values())
         self._stays = f"; the earlier results stay in {self._folder}{saved}"
@@ -333,7 +336,7 @@ class FileSink:
         Returns:
             The files that could not be written, each with its error.
         """
-        assert self._own is not None
+        assert self.listed is not None
         troubles: dict[str, OSError] = {}
         try:
             os.fsync(self._file)
@@ -342,34 +345,34 @@ class FileSink:
         for name, text in texts.items():
             try:
                 if name != "report.json":
-                    self._own.add(name)
-                self._own.write_text(name, text)
+                    self.listed.add(name)
+                self.listed.write_text(name, text)
             except OSError as error:
                 troubles[name] = error
         try:
-            self._own.sync()
+            self.listed.sync()
         except OSError as error:
             troubles.setdefault("report.json", error)
         return troubles
 
     def _let_go(self) -> None:
-        if self._own is None:
+        if self.listed is None:
             return
         if self._file >= 0:
             os.close(self._file)
-        self._own.close()
-        self._own = None
+        self.listed.close()
+        self.listed = None
 
     def _is_due(self, number: int) -> bool:
         return self._save_every > 0 and number % self._save_every == 0
 
     def _save(self, result: Result) -> None:
         """Write a pair's folder, completely or not at all."""
-        assert self._own is not None
+        assert self.listed is not None
         try:
             with (
                 ThreadPoolExecutor(_WRITERS) as writers,
-                self._own.new_folder(f"pair-{result.number:06d}", writers.map) as folder,
+                self.listed.new_folder(f"pair-{result.number:06d}", writers.map) as folder,
             ):
                 write_pair(folder, result.processed, RUN_FILES, self._axes, writers.map)
         except OSError as error:
@@ -377,5 +380,5 @@ class FileSink:
             self._of_pairs.begins(error)
             raise NotWrittenError from None
         self._saved_pairs += 1
-        self._own.spare_staged()
+        self.listed.spare_staged()
         self._of_pairs.ends()

@@ -30,6 +30,9 @@ _RECENT: Final = 300
 class LiveTable(Redrawn):
     """Shows a run's delays while it is running; a context manager.
 
+    Attributes:
+        progress: its bar.
+
     Args:
         snapshot: returns the run's present state.
         console: where to draw; stderr by default, so that stdout is free for results.
@@ -54,11 +57,11 @@ class LiveTable(Redrawn):
         self._shown_s = 0.0
         self._last = (0, now.monotonic_ns() / 1e9)
         self._rate = 0.0
-        self._progress = Progress(
+        self.progress = Progress(
             TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f}/{task.total:.0f}")
         )
         total = seconds or pairs
-        self._task = self._progress.add_task("seconds" if seconds else "pairs", total=total) if total else None
+        self._task = self.progress.add_task("seconds" if seconds else "pairs", total=total) if total else None
 
     def refresh(self) -> None:
         """Show the present state, at most a few times a second."""
@@ -75,12 +78,12 @@ class LiveTable(Redrawn):
             self._begun_s = now_s
         if self._task is not None:
             lasted_s = min(self._seconds, now_s - self._begun_s) if self._begun_s else 0.0
-            self._progress.update(self._task, completed=lasted_s if self._seconds else run.processed)
+            self.progress.update(self._task, completed=lasted_s if self._seconds else run.processed)
         self.draw(self._parts(run, self.console.width))
 
     def _parts(self, run: RunSnapshot, width: int) -> Sequence[Part]:
         """Return the view from top to bottom; on a low terminal warnings, bar and table are what stays."""
-        bar = [Part(1, self._progress)] if self._task is not None else []
+        bar = [Part(1, self.progress)] if self._task is not None else []
         return (
             *(Part(0, line) for line in _warnings(run)),
             *(Part(3, line) for line in _cameras(run)),

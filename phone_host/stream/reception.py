@@ -59,6 +59,7 @@ class Reception:
 
     Attributes:
         account: the links' account so far.
+        border: what decides whether frames are believed.
         tail_known: whether the board has told the last account of this session.
         due_ns: when to call `tick` next even if nothing comes, ns; as of the last `tick`.
 
@@ -93,7 +94,7 @@ class Reception:
         self._is_paced = any(link.self_paced for link in links)
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
-        self._border = Border(self.account, sink.void)
+        self.border = Border(self.account, sink.void)
 
     def refused(self, now_ns: int) -> BoardRefusal | None:
         """Return why the last board heard refuses this host; None if it does not, or is silent now."""
@@ -123,7 +124,7 @@ class Reception:
     @property
     def estimate(self) -> ClockEstimate | None:
         """The clock estimate now; None before the first echo, and while it is in doubt."""
-        return self._border.estimate
+        return self.border.estimate
 
     @property
     def ended(self) -> bool:
@@ -143,10 +144,10 @@ class Reception:
             if isinstance(lost, StaleReason):
                 self.account.current.count_stale(lost)
             else:
-                self._accept_frame(message, lost, link, now_ns)
+                self.accept_frame(message, lost, link, now_ns)
             return
         self._has_news = True
-        self._handle(self._session.receive(connection, message, now_ns), now_ns)
+        self.handle(self._session.receive(connection, message, now_ns), now_ns)
 
     def refuse_version(self, connection: bytes, theirs: int, now_ns: int) -> None:
         """Take note of a message of another protocol version.
@@ -167,7 +168,7 @@ class Reception:
     def interrupted(self, connection: bytes, now_ns: int) -> None:
         """Take note that a connection broke."""
         self._has_news = True
-        self._handle(self._session.interrupted(connection, now_ns), now_ns)
+        self.handle(self._session.interrupted(connection, now_ns), now_ns)
 
     def tick(self, now_ns: int) -> None:
         """Do what is due, and grant credit if there is room for frames."""
@@ -179,24 +180,24 @@ class Reception:
     def _attend(self, now_ns: int) -> None:
         """Do what is due. A frame that passes makes nothing due: it only shows that its link is alive."""
         self._has_news = False
-        if self._border.waits_for_echo:
+        if self.border.waits_for_echo:
             self._has_news = True
-            self._border.tick(now_ns)
+            self.border.tick(now_ns)
             self._session.probe(now_ns)
         if self._locks.is_due(now_ns):
-            self._handle(self._session.set_locks(self._locks.wanted), now_ns)
+            self.handle(self._session.set_locks(self._locks.wanted), now_ns)
         due_ns = self._session.due_ns
         if now_ns >= due_ns:
-            self._handle(self._session.tick(now_ns), now_ns)
+            self.handle(self._session.tick(now_ns), now_ns)
             if self._is_choosing and (best := self._choice.best(now_ns)) is not None:
-                self._handle(self._session.carry(best, now_ns), now_ns)
+                self.handle(self._session.carry(best, now_ns), now_ns)
             due_ns = self._session.due_ns
         self.due_ns = due_ns
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
         if self._hello is not None:
-            self._handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
+            self.handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
 
     def hold(self, locks: Locks) -> None:
         """Have the board's camera held like this, in this session and every later one."""
@@ -206,24 +207,24 @@ class Reception:
     def slept(self, slept_ns: int, now_ns: int) -> None:
         """Take note that this machine has slept: its clock stood still while the board's and the cameras' went on."""
         self._has_news = True
-        self._border.slept(slept_ns)
-        self._handle(self._session.begin_clock(now_ns), now_ns)
+        self.border.slept(slept_ns)
+        self.handle(self._session.begin_clock(now_ns), now_ns)
 
     def doubt_clock(self, why: str, now_ns: int) -> None:
         """Take note that this machine's clock may have stood still. An echo asked for from now on will tell."""
         self._has_news = True
-        self._border.void(why)
-        self._handle(self._session.begin_clock(now_ns), now_ns)
+        self.border.void(why)
+        self.handle(self._session.begin_clock(now_ns), now_ns)
 
     def leave(self, now_ns: int) -> bool:
         """Say goodbye. Return whether a board hears it; it will answer with its last account (`tail_known`)."""
         farewell = self._session.leave()
-        self._handle(farewell, now_ns)
+        self.handle(farewell, now_ns)
         return bool(farewell)
 
     def close(self) -> None:
         """Take note that nothing more will come."""
-        self._border.close()
+        self.border.close()
 
     def lose_tail(self) -> None:
         """Take note that the last account did not come: what the board sent since the newest account is unknown."""
@@ -244,19 +245,20 @@ class Reception:
                 self._paced_round_trip_ns() if self._is_paced else None,
             )
             frames = self._flow.credit(outstanding, self._hello.camera.period_ns, round_trip_ns)
-        if frames and self._border.takes_frames:  # without a clock, frames could not be paired
-            self._handle(self._session.grant(frames), now_ns)
+        if frames and self.border.takes_frames:  # without a clock, frames could not be paired
+            self.handle(self._session.grant(frames), now_ns)
 
     def _paced_round_trip_ns(self) -> int | None:
         """Round trip of the carrier if it paces itself, ns; 0 before its first echo."""
         carrier = self._session.carrier
         if carrier is None or not self._links[carrier].self_paced:
             return None
-        return self._border.round_trip_ns(carrier) or 0
+        return self.border.round_trip_ns(carrier) or 0
 
-    def _handle(self, outputs: list[Output], now_ns: int) -> None:
+    def handle(self, outputs: list[Output], now_ns: int) -> None:
+        """Do what the session says, save for frames: those come by a shorter way, see `receive`."""
         for output in outputs:
-            assert not isinstance(output, Arrived | Stale)  # frames come by a shorter way, see `receive`
+            assert not isinstance(output, Arrived | Stale)
             match output:
                 case Outgoing():
                     self._send(output)
@@ -282,9 +284,9 @@ class Reception:
     def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
         """Give an echo to the clock and pass the frames that it has proven; or restart the clock if it is void."""
         if isinstance(echo, ClockVoid):
-            self._border.void("the board had not heard this host for a while")
+            self.border.void("the board had not heard this host for a while")
             return
-        for passed in self._border.learn(echo):
+        for passed in self.border.learn(echo):
             self._pass(*passed)
         self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
 
@@ -317,7 +319,7 @@ class Reception:
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
         """Take note that the board has gone from all links."""
-        self._border.close()
+        self.border.close()
         self.account.current.vanished = not orderly
         if not self.account.current.ended:
             self.account.board_left(now_ns)
@@ -335,13 +337,13 @@ class Reception:
                 self._refusals.link_up(link)
                 if hello.boot_id != self._boot_id:
                     self._boot_id = hello.boot_id
-                    self._border.other_clock()
+                    self.border.other_clock()
                 self._choice.up(link, now_ns)
                 _LOG.info(event("link_up", link=tally.name))
             case LinkDown(link, stuck):
                 tally.is_up = stuck
                 tally.lost += 1
-                self._border.link_down(link)
+                self.border.link_down(link)
                 self._choice.down(link, now_ns)
                 if stuck:
                     self._choice.up(link, now_ns)
@@ -407,7 +409,7 @@ class Reception:
         fps = round(1e9 / rung.period_ns, 2)
         _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
-    def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
+    def accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
         """Count a frame of the present session and give it to the border."""
         account, tally = self.account.sessions[-1], self.account.links[link]
         account.received += 1
@@ -416,7 +418,7 @@ class Reception:
         tally.bytes += len(frame.payload)
         assert self._hello is not None
         arrival = Arrival(frame, link, account, self._hello.camera, now_ns)
-        if (believed := self._border.admit(arrival)) is None:
+        if (believed := self.border.admit(arrival)) is None:
             self._has_news = True
         else:
             self._pass(link, believed)
@@ -435,5 +437,5 @@ class Reception:
             transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, frame.received_ns
         )
         self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
-        self._border.passed(message)
+        self.border.passed(message)
         self._sink.add_board(frame)

@@ -131,7 +131,7 @@ def run(request: DemoRequest) -> int:
             "make room on the disk, or give another folder with --out",
         ) from None
     print(json_text(report) if request.as_json else headed(summary(snapshot, columns()), columns(), rows()))
-    say(_closing(out, film, errors), sys.stderr)
+    say(closing(out, film, errors), sys.stderr)
     if signals.stop:
         return INTERRUPTED if signals.interrupted else 0
     return 0 if errors.pairs and not errors.wrong_pairs and complete else CHECK_FAILED
@@ -190,7 +190,8 @@ def _by_hand(out: Path, film: Film) -> tuple[NextCommand, ...]:
     )
 
 
-def _closing(out: Path, film: Film, errors: DepthErrors) -> str:
+def closing(out: Path, film: Film, errors: DepthErrors) -> str:
+    """Return the demo's last words: how good the depth was, and what to do by hand next."""
     board, host = (one.command for one in _by_hand(out, film)[:2])
     if not errors.pairs:
         return f"no pair was processed in that time, so nothing could be checked: give more --seconds; see {out}/index.html"

@@ -135,11 +135,11 @@ def _paint(seed: int, width_px: int) -> Room:
     )
     exact = truth(painted.scene, view)
     known = np.where(exact.visible, exact.disparity_px, np.nan).astype(np.float32)
-    parts = _parts(painted, exact.body, exact.depth_m, pixel_rays(left))
+    parts = parts_of(painted, exact.body, exact.depth_m, pixel_rays(left))
     return Room(f"room{seed}-{width_px}", *images, known, parts, width_px // 10)
 
 
-def _parts(
+def parts_of(
     painted: Painted, owner: NDArray[np.int16], depth_m: NDArray[np.float64], rays: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
     """Name what each pixel of the left image shows."""

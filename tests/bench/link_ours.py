@@ -83,14 +83,14 @@ def receive_tandemscan(job: Job) -> Tally:
 
     sink = Unkept(None if job.fps else _SLOTS)
     receiver = Receiver([_open(job.address)], now.random_id(), sink)
-    take_in = receiver._reception._accept_frame
+    take_in = receiver.reception.accept_frame
 
     def stamped(frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
         """Stamp a frame once it is decoded and the session has taken it, before the host decides whether to believe it."""
         tally.arrived(frame.sequence, frame.marks.sent_ns, len(frame.payload))
         take_in(frame, lost, link, now_ns)
 
-    receiver._reception._accept_frame = stamped  # type: ignore[method-assign]
+    receiver.reception.accept_frame = stamped  # type: ignore[method-assign]
     receiver.start()
     while not receiver.ended and receiver.failure is None:
         time.sleep(1)  # its wake-ups are no part of the link

@@ -13,9 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import CameraModel, CloudImage, RectifiedPair, Rig
-from phone_host.output import ply
-from phone_host.output.axes import Axes
+from phone_host.model import CameraModel, RectifiedPair, Rig
+from phone_host.output.ply import packed_points
 from phone_host.scene.scene import Look, demo_scene, matched_rig, rectified_cameras, render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_pair
@@ -119,21 +118,15 @@ def _rig(where: Setting) -> Rig:
     return replace(own, left=model, right=model)
 
 
-def _packed(cloud: CloudImage, colours: Image) -> object:
-    return ply._vertices(cloud, colours, ply._finite(cloud), Axes.CAMERA)
-
-
 def our_chain(where: Setting, name: str) -> Run:
     """Two JPEGs -> decoded, rectified, matched, reprojected, cut -> coloured vertices as they stand in a PLY file."""
     left, right = _jpeg(where.left), _jpeg(where.right)
     core = StereoCore(MatchSettings(matcher_named(name), where.disparities), Rectifier(_rig(where)))
-    # One native pass, where this version of the product has it.
-    packed = getattr(ply, "packed_points", None) or _packed
 
     def run() -> object:
         done = core.compute(*decode_pair(left, right), time.perf_counter_ns)
         assert done.cloud is not None
-        return packed(done.cloud, done.pair.left)
+        return packed_points(done.cloud, done.pair.left)
 
     return run
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from phone_host.native.build_library import FLAGS, SOURCES, WARNINGS, _compiled, _usable_sets
+from phone_host.native.build_library import FLAGS, SOURCES, WARNINGS, compiled, usable_sets
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.instructions import Emulated, missing, per_pixel_and_disparity
 
@@ -128,8 +128,8 @@ def built(target: Target, folder: Path) -> Path:
     """
     assert target.compiler is not None
     compiler = (target.compiler,)
-    isa = next(isa for isa in _usable_sets(compiler, folder)[0] if isa.name == target.isa)
-    kernel = _compiled(compiler, folder, "sweep_kernel.c", isa, ())
+    isa = next(isa for isa in usable_sets(compiler, folder)[0] if isa.name == target.isa)
+    kernel = compiled(compiler, folder, "sweep_kernel.c", isa, ())
     program = folder / "sweep"
     flags = [*FLAGS, *WARNINGS, "-Werror", *isa.flags, f"-DTANDEM_ISA={isa.name}", f"-I{SOURCES}"]
     subprocess.run([*compiler, *flags, "-static", "-o", program, PROGRAM, kernel], check=True)

@@ -1,6 +1,5 @@
 """What the documentation says is what the programs do."""
 
-import argparse
 import json
 import re
 from pathlib import Path
@@ -16,6 +15,7 @@ from tests.docs import troubleshooting
 from tests.docs.commands import ROOT, Command, documented, pages
 from tests.docs.imports import PICTURE, reduced, rooms
 from tests.docs.message_texts import Code
+from tests.support.requests import verbs_in
 from tests.support.rigs import unlike_rig
 from tests.support.samples import LEDGER
 
@@ -38,7 +38,7 @@ def test_every_command_line_is_one_that_the_program_takes(command: Command) -> N
     """The real parser accepts it; text that only names a verb names an existing one."""
     parser = _PARSERS[command.words[0]]()
     if command.is_mention:
-        assert set(command.named[1:]) <= _verbs(parser)
+        assert set(command.named[1:]) <= verbs_in(parser).keys()
     else:
         parser.parse_args(command.words[1:])
 
@@ -84,11 +84,6 @@ def test_readme_is_one_screen() -> None:
     assert len(lines) <= 120
     assert max(map(len, lines)) <= 120
     assert sum(len(line.split()) for line in lines) <= 900
-
-
-def _verbs(parser: argparse.ArgumentParser) -> set[str]:
-    actions = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    return {name for action in actions for name in action.choices}
 
 
 def test_the_picture_of_imports_is_of_this_code() -> None:

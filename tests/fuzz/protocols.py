@@ -119,7 +119,7 @@ def deframer(data: bytes) -> None:
     while at < len(stream):
         step = 1 + 37 * stream[at]
         pieces += [_wire(LinkEnd.LISTENER, unit) for unit in chopped.feed(stream[at : at + step])]
-        assert len(chopped._rest) <= 4096, "more than one unit's bytes are kept"
+        assert len(chopped.rest) <= 4096, "more than one unit's bytes are kept"
         at += step
     assert units == pieces, "chopping changes the units"
     units += [_wire(LinkEnd.LISTENER, unit) for unit in whole.give_up()]
@@ -199,9 +199,7 @@ def line(data: bytes) -> None:
                 if isinstance(event, Whole):
                     assert len(event.header) <= MAX_HEADER_BYTES, "a header beyond the limit"
                     assert len(event.payload) <= MAX_PAYLOAD_BYTES, "a payload beyond the limit"
-            assert sum(len(item.data) for item in end._joiner._under_way.values()) <= len(data), (
-                "more is held than came"
-            )
+            assert sum(len(item.data) for item in end.joiner.under_way.values()) <= len(data), "more is held than came"
             if flags & 64:
                 end.put(Lane(flags >> 7), b"answer", bytes(extra * 64 * (flags >> 7 ^ 1)))
             end.take(now_ns)

@@ -10,7 +10,7 @@ import pytest
 
 from common.errors import SettingsError
 from phone_host.api import export_model
-from tests.print.test_print_verb import _cube_file, environment
+from tests.print.test_print_verb import cube_file, environment
 
 NAN_PLY = (
     b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -33,8 +33,8 @@ def models(tmp_path: Path) -> Path:
     (tmp_path / "empty.stl").write_bytes(bytes(80) + struct.pack("<I", 0))
     (tmp_path / "nan.ply").write_bytes(NAN_PLY)
     (tmp_path / "beyond.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999999\n")
-    _cube_file(tmp_path / "open.stl", 20, is_open=True)
-    _cube_file(tmp_path / "cube.stl", 20)
+    cube_file(tmp_path / "open.stl", 20, is_open=True)
+    cube_file(tmp_path / "cube.stl", 20)
     return tmp_path
 
 

@@ -119,7 +119,7 @@ def test_a_printer_that_leaves_while_it_is_cancelled_is_told(tmp_path: Path) -> 
 
     def answer(line: str, _: int) -> bytes:
         if "M104 S0" in line:
-            there._is_over.set()
+            there.is_over.set()
             return b""
         return b"ok\n"
 
@@ -143,7 +143,7 @@ def test_a_printer_that_is_deaf_while_it_heats_cools_when_it_hears(twice: bool, 
             until(lambda: "M109 S210" in there.done, "it heats")
             process.send_signal(signal.SIGINT)
             if twice:
-                until(lambda: b"M104" in there._waiting, "it is being cancelled")
+                until(lambda: b"M104" in there.waiting, "it is being cancelled")
                 process.send_signal(signal.SIGINT)
             _, errors = process.communicate(timeout=60)
         assert "M109 S210" in there.done[-1], "the host has left before the printer hears"

@@ -19,7 +19,7 @@ from phone_host.printers.doors import key_of
 from phone_host.printers.gcode import examine
 from phone_host.printers.printer_uri import ServerKind, read_uri
 from phone_host.printers.server_door import name_there
-from tests.print.test_print_verb import _cube_file, command, done, environment
+from tests.print.test_print_verb import command, cube_file, done, environment
 from tests.support.marlin_printer import Faults, cube, printer
 from tests.support.print_server import KEY, ServerFaults, print_server
 from tests.support.programs import until
@@ -154,7 +154,7 @@ SLICERS = [
 @pytest.mark.parametrize("slicer", SLICERS)
 def test_each_slicer_puts_a_cube_into_the_middle_of_the_bed(slicer: str, tmp_path: Path) -> None:
     """In its size, hot while it prints and cold at the end; what the slicer refuses is one line."""
-    stl, out = _cube_file(tmp_path / "cube.stl", 20), tmp_path / "cube.gcode"
+    stl, out = cube_file(tmp_path / "cube.stl", 20), tmp_path / "cube.gcode"
     more = {"CURA_ENGINE_SEARCH_PATH": f"{CURA}/definitions:{CURA}/extruders"} if slicer == "cura" else {}
     asked = command(
         tmp_path, str(stl), "--unit", "mm", "--slicer", slicer, "--bed", "100,120,90", "--printer", f"file:{out}"

@@ -150,7 +150,7 @@ def test_bad_input_gets_one_line(gcode: Path, tmp_path: Path, arguments: list[st
     assert len(ended.stderr.splitlines()) == 1
 
 
-def _cube_file(path: Path, side_mm: float, *, is_open: bool = False) -> Path:
+def cube_file(path: Path, side_mm: float, *, is_open: bool = False) -> Path:
     """Write a cube as text STL, its last two triangles left out or not."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float) * side_mm
     squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -167,7 +167,7 @@ def _cube_file(path: Path, side_mm: float, *, is_open: bool = False) -> Path:
 @pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="needs prusa-slicer")
 def test_a_model_is_sliced_and_printed(tmp_path: Path) -> None:
     """A cube of 6 mm comes out in the middle of the bed, hot, and cold at the end."""
-    stl = _cube_file(tmp_path / "cube.stl", 6)
+    stl = cube_file(tmp_path / "cube.stl", 6)
     with printer() as there:
         ended = done(tmp_path, str(stl), "--unit", "mm", "--printer", uri(there), "--bed", "100,120,90", "--yes")
         assert (there.nozzle, there.bed) == (0.0, 0.0)
@@ -185,9 +185,9 @@ def test_a_model_that_cannot_be_printed_is_refused(tmp_path: Path) -> None:
     there = ["--printer", "serial:/dev/ttyNOPE", "--yes", "--unit", "mm"]
     (tmp_path / "bad.ini").write_text("layer_height = many\n")
     cases = [
-        ([str(_cube_file(tmp_path / "open.stl", 20, is_open=True))], "cannot be printed"),
-        ([str(_cube_file(tmp_path / "large.stl", 400))], "cannot be printed"),
-        ([str(_cube_file(tmp_path / "cube.stl", 20)), "--profile", str(tmp_path / "bad.ini")], "the slicer refuses"),
+        ([str(cube_file(tmp_path / "open.stl", 20, is_open=True))], "cannot be printed"),
+        ([str(cube_file(tmp_path / "large.stl", 400))], "cannot be printed"),
+        ([str(cube_file(tmp_path / "cube.stl", 20)), "--profile", str(tmp_path / "bad.ini")], "the slicer refuses"),
     ]
     for arguments, words in cases:
         ended = done(tmp_path, *arguments, *there)
@@ -198,7 +198,7 @@ def test_a_model_that_cannot_be_printed_is_refused(tmp_path: Path) -> None:
 
 def test_without_a_slicer_it_says_how_to_get_one(tmp_path: Path) -> None:
     """Exit 3; G-code still prints."""
-    stl = _cube_file(tmp_path / "cube.stl", 20)
+    stl = cube_file(tmp_path / "cube.stl", 20)
     asked = command(tmp_path, str(stl), "--printer", "serial:/dev/ttyNOPE", "--yes")
     bare = {**environment(tmp_path), "PATH": str(tmp_path)}
     ended = subprocess.run(asked, env=bare, capture_output=True, text=True, check=False, timeout=60)

@@ -31,7 +31,7 @@ class LyingPrinter:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.uri = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self.lines: list[str] = []
-        self._is_over = threading.Event()
+        self.is_over = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
@@ -43,13 +43,13 @@ class LyingPrinter:
 
     def stop(self) -> None:
         """Switch it off."""
-        self._is_over.set()
+        self.is_over.set()
         self._thread.join(10)
         self._listener.close()
 
     def _run(self) -> None:
         while not select([self._listener], [], [], 0.05)[0]:
-            if self._is_over.is_set():
+            if self.is_over.is_set():
                 return
         connection, _ = self._listener.accept()
         with connection, suppress(OSError):
@@ -58,7 +58,7 @@ class LyingPrinter:
 
     def _talk(self, connection: socket.socket) -> None:
         waiting = b""
-        while not self._is_over.is_set():
+        while not self.is_over.is_set():
             if self._chatter:
                 with suppress(OSError):  # a host that has said goodbye may still have sent its last lines
                     connection.sendall(self._chatter)
@@ -80,7 +80,7 @@ class LyingPrinter:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         for byte in said:
             connection.sendall(bytes([byte]))
-            self._is_over.wait(0.001)
+            self.is_over.wait(0.001)
 
 
 @contextmanager

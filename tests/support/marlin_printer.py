@@ -117,7 +117,7 @@ class MarlinPrinter:
         self.resends = self.lost = 0
         self._said_with_ok = ""
         self._last = 0
-        self._waiting = b""
+        self.waiting = b""
         self._is_over, self.is_released = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -151,8 +151,8 @@ class MarlinPrinter:
             chatter.start()
             while not self._is_over.is_set():
                 self._read(0.02)
-                while b"\n" in self._waiting:
-                    line, _, self._waiting = self._waiting.partition(b"\n")
+                while b"\n" in self.waiting:
+                    line, _, self.waiting = self.waiting.partition(b"\n")
                     if len(self.done) >= self._faults.dies_after:
                         os.close(self._master)
                         return
@@ -189,7 +189,7 @@ class MarlinPrinter:
             raise OSError("the host has closed the connection")
         if self._faults.baud:
             self._is_over.wait(len(data) * _BITS / self._faults.baud)
-        self._waiting += data
+        self.waiting += data
         return data
 
     def _chat(self) -> None:

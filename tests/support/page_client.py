@@ -20,6 +20,7 @@ class PageClient:
     """
 
     def __init__(self, url: str) -> None:
+        self.url = url
         self.address, _, self._token = url.partition("/?token=")
 
     def get(self, path: str) -> bytes:

@@ -80,6 +80,7 @@ class HostNode:
     names: dict[Place, bytes] = field(default_factory=dict)
     board_session: str = ""
     boot_id: str = ""
+    accepted_boot_id: str = ""
     base_sent: int = 0
     received: int = 0
     lost: int = 0
@@ -206,13 +207,13 @@ class World:
         self.now_ns += duration_ns
         self.shoot()
         if self.now_ns >= self.board.due_ns:
-            self._board_says(self.board.tick(self.now_ns, self.counts))
+            self.board_says(self.board.tick(self.now_ns, self.counts))
             assert self.board.due_ns > self.now_ns, "a tick must move its own time on, or the poll loop would spin"
         for host in self.hosts:
             if self.now_ns >= host.session.due_ns:
-                self._host_does(host, host.session.tick(self.now_ns))
+                self.host_does(host, host.session.tick(self.now_ns))
                 assert host.session.due_ns > self.now_ns
-            self._host_does(host, host.session.grant(host.slots))
+            self.host_does(host, host.session.grant(host.slots))
 
     def shoot(self) -> None:
         """The camera has a frame; it is sent if there is credit."""
@@ -268,26 +269,28 @@ class World:
         dialled = tuple((place[1], _dialled(place)) for place in self.places) if self.board_dials else ()
         return BoardSession(session, self.boot_id, CAMERA, dialled)
 
-    def _board_name(self, host: HostNode, place: Place) -> bytes:
+    def board_name(self, host: HostNode, place: Place) -> bytes:
+        """The board's name for a connection."""
         if self.board_dials:
             return _dialled(place)
         return next(name for name, (_, _, wire) in self.wires.items() if wire is host.wires[place])
 
     def _board_takes(self, host: HostNode, place: Place, message: Message | Broken) -> None:
-        name = self._board_name(host, place)
+        name = self.board_name(host, place)
         if isinstance(message, Broken):
-            self._board_says(self.board.unreachable(name))
+            self.board_says(self.board.unreachable(name))
         else:
-            self._board_says(self.board.receive(name, message, self.now_ns, self.counts))
+            self.board_says(self.board.receive(name, message, self.now_ns, self.counts))
 
-    def _board_says(self, said: list[Outgoing]) -> None:
+    def board_says(self, said: list[Outgoing]) -> None:
+        """Send what the board's session has said."""
         for outgoing in said:
             self._board_sends(outgoing)
 
     def _board_sends(self, outgoing: Outgoing) -> bool:
         found = self.wires.get(outgoing.connection)
         if found is None:
-            self._board_says(self.board.unreachable(outgoing.connection))
+            self.board_says(self.board.unreachable(outgoing.connection))
             return False
         _, place, wire = found
         if isinstance(outgoing.message, FrameMessage):
@@ -300,17 +303,19 @@ class World:
     def _host_takes(self, host: HostNode, place: Place, message: Message | Broken) -> None:
         name = host.names[place]
         if isinstance(message, Broken):
-            self._host_does(host, host.session.interrupted(name, self.now_ns))
+            self.host_does(host, host.session.interrupted(name, self.now_ns))
         else:
-            self._host_does(host, host.session.receive(name, message, self.now_ns))
+            self.host_does(host, host.session.receive(name, message, self.now_ns))
 
-    def _host_does(self, host: HostNode, outputs: list[Output]) -> None:
+    def host_does(self, host: HostNode, outputs: list[Output]) -> None:
+        """Do what a host's session has said, and check the invariants."""
         for output in outputs:
             match output:
                 case Outgoing(connection, message):
-                    self._host_sends(host, connection, message)
+                    self.host_sends(host, connection, message)
                 case Accepted(hello=hello, resumed=resumed, lost=lost, link=link):
                     host.carriers.append(link)
+                    host.accepted_boot_id = hello.boot_id
                     assert lost >= 0
                     assert resumed == (host.board_session == hello.session)
                     if not resumed:
@@ -347,7 +352,8 @@ class World:
                 ):
                     host.others.append(output)
 
-    def _host_sends(self, host: HostNode, connection: bytes, message: Message) -> None:
+    def host_sends(self, host: HostNode, connection: bytes, message: Message) -> None:
+        """Send a message of a host."""
         if isinstance(message, Credit):
             known = self.credit.get(host.board_session, 0)
             self.credit[host.board_session] = max(known, message.below_index)

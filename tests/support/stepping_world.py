@@ -72,6 +72,7 @@ class SteppingWorld:
         self._chance = random.Random(seed)
         self.latency_ns, self._jitter = latency_ns, jitter
         self.answers_echoes = True
+        self.wave = 0
         self.true_ns = 10**13
         self.host = Machine(-(10**12))
         self.board = Machine(7 * 10**12)
@@ -110,7 +111,7 @@ class SteppingWorld:
             self._run_board()
             self._deliver("host")
             self._run_host()
-            while len(self.queue._fifo):  # its counts would be rebuilt at each step
+            while self.queue.has_waiting():
                 pair = self.queue.take()
                 assert pair is not None
                 self.witness.judge(pair, self.queue.tolerance_ns)
@@ -192,6 +193,11 @@ class SteppingWorld:
     # Observation.
 
     @property
+    def board_session(self) -> str:
+        """Of the board's process now."""
+        return self._board.session
+
+    @property
     def _apart_ns(self) -> int:
         """How far the board's clock is ahead of the host's."""
         return self.board.shift_ns - self.host.shift_ns
@@ -202,7 +208,7 @@ class SteppingWorld:
         assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
         received = sum(session.received for session in account.sessions)
         dropped = sum(count for reason, count in account.disbelieved.items() if reason is not Disbelief.CREDIT)
-        waiting = len(self.reception._border._quarantine.held)
+        waiting = len(self.reception.border.quarantine.held)
         assert received == counts.received + account.no_clock + dropped + waiting
 
     def is_suspect(self, pair: WrongPair) -> bool:
@@ -358,6 +364,7 @@ class SteppingWorld:
     def _host_says(self, outgoing: Outgoing) -> None:
         message = outgoing.message
         if isinstance(message, Ping):
+            self.wave = message.wave
             message = replace(message, t0_ns=self.host_clock())
             self.witness.asked(message.wave, self.true_ns, self._apart_ns)
         self._put(_lane(outgoing.connection), "board", message)

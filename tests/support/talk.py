@@ -44,14 +44,15 @@ class Talk:
         self.camera = camera
         self.now_ns = 10**12
         self.said: list[Outgoing] = []
+        self.wave = 0
         self.queue = PairQueue(FifoSettings(8), None, CAMERA.period_ns, clock=lambda: self.now_ns)
         facts = [LinkFacts("tcp", dict(NAMES) if dialled else {}, self_paced=False)]
         self.reception = Reception(facts, "host", sink or self.queue, self.said.append)
         self.begin("first")
 
-    def begin(self, session: str) -> None:
-        """Begin a new session of the board."""
-        self.board = BoardSession(session, "boot", self.camera)
+    def begin(self, session: str, boot_id: str = "boot") -> None:
+        """Begin a new session of the board, perhaps after a reboot."""
+        self.board = BoardSession(session, boot_id, self.camera)
         self.sent = 0
 
     def run(self, ticks: int = 20) -> None:
@@ -67,6 +68,7 @@ class Talk:
             outgoing = self.said.pop(0)
             message: Message = outgoing.message
             if isinstance(message, Ping):
+                self.wave = message.wave
                 message = replace(message, t0_ns=self.now_ns - MS)
             for reply in self.board.receive(
                 outgoing.connection, message, self.now_ns, BoardCounts(self.sent, self.sent)

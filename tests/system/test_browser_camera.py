@@ -319,7 +319,7 @@ def test_a_board_and_a_browser_are_paired(tmp_path: Path) -> None:
     with (
         board(["run", "--camera", f"replay:{film}?fps={fps}&loop=1", "--link", link], tmp_path),
         page([*arguments, "--save-every", "3", "--pairs", "60"], tmp_path) as (running, client),
-        ScriptedBrowser(f"{client.address}/?token={client._token}", Script(shots=numbered(images), fps=fps)),
+        ScriptedBrowser(client.url, Script(shots=numbered(images), fps=fps)),
     ):
         assert running.wait() == 0, running.stderr
     numbers = saved_numbers(out)

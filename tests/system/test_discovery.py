@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from phone_host.discovery.discovery import _last, remember
+from phone_host.discovery.discovery import remember, remembered
 from phone_host.discovery.found import SERVICE
 from tests.support.numbered import write_film
 from tests.support.programs import PATIENCE_S
@@ -132,9 +132,9 @@ def test_the_package_brings_the_announcement(tmp_path: Path) -> None:
 def test_a_spoiled_memory_is_no_board(text: str, tmp_path: Path) -> None:
     """Whatever the file of the last board contains, the result is a tcp link or nothing."""
     (tmp_path / "last-board").write_bytes(text.encode("utf-8", "surrogatepass"))
-    assert _last(tmp_path) == []
+    assert remembered(tmp_path) == []
     remember(tmp_path, "tcp://192.0.2.1:5555")
-    assert _last(tmp_path) == ["tcp://192.0.2.1:5555"]
+    assert remembered(tmp_path) == ["tcp://192.0.2.1:5555"]
 
 
 def test_the_memory_leads_nowhere(tmp_path: Path) -> None:
@@ -143,8 +143,8 @@ def test_the_memory_leads_nowhere(tmp_path: Path) -> None:
     (tmp_path / "state").mkdir()
     for plant in (lambda path: path.symlink_to(tmp_path / "precious"), os.mkfifo):
         plant(tmp_path / "state" / "last-board")
-        assert _last(tmp_path / "state") == []
+        assert remembered(tmp_path / "state") == []
         remember(tmp_path / "state", "tcp://192.0.2.1:5555")
-        assert _last(tmp_path / "state") == ["tcp://192.0.2.1:5555"]
+        assert remembered(tmp_path / "state") == ["tcp://192.0.2.1:5555"]
         (tmp_path / "state" / "last-board").unlink()
     assert (tmp_path / "precious").read_text() == "tcp://192.0.2.7:5555"

@@ -84,7 +84,9 @@ def test_images_spoiled_on_the_host_cost_only_their_own_pairs(tmp_path: Path) ->
     assert all(a == b and a % 4 != 3 for a, b in saved_numbers(out))
     report = receiver.json()
     assert report["host_frames"]["spoiled"] >= 9
-    assert report["frames"]["orphaned"]["no_partner"] >= 9
+    [session] = report["sessions"]
+    never_came = sum(session["dropped"].values()) + session["lost"]  # a busy machine's; they need no partner
+    assert report["frames"]["orphaned"]["no_partner"] >= 9 - never_came
 
 
 VERSIONS = pytest.mark.parametrize(

@@ -11,8 +11,9 @@ import pytest
 
 from board_agent.cli import parser as board_parser
 from phone_host.cli import parser as host_parser
-from phone_host.doctor.host_doctor import _FURTHER_MODULES  # the list that must be complete
+from phone_host.doctor.host_doctor import FURTHER_MODULES  # the list that must be complete
 from tests.support.numbered import write_film
+from tests.support.requests import verbs_in
 
 _HIDE = """
 import os, sys
@@ -71,14 +72,8 @@ def without(module: str, folder: Path, program: str, *arguments: str) -> subproc
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=folder, env=environment)
 
 
-def verbs(parser: object) -> list[str]:
-    """Return the verbs of a program."""
-    (actions,) = [action for action in parser._actions if action.dest == "verb"]  # type: ignore[attr-defined]
-    return list(actions.choices)
-
-
 @pytest.mark.parametrize(
-    "verb", [verb for verb in verbs(host_parser()) if verb not in {"doctor", "keys", "pair", "settings"}]
+    "verb", [verb for verb in verbs_in(host_parser()) if verb not in {"doctor", "keys", "pair", "settings"}]
 )
 def test_a_verb_without_numpy_is_one_line(tmp_path: Path, verb: str) -> None:
     """It names the package and what installs it, prints nothing else, not even OpenCV's own lines, and ends with 3."""
@@ -121,7 +116,7 @@ def test_any_missing_package_is_one_line(tmp_path: Path, module: str, program: s
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("verb", verbs(board_parser()))
+@pytest.mark.parametrize("verb", verbs_in(board_parser()))
 def test_no_verb_of_the_board_shows_a_traceback(tmp_path: Path, verb: str) -> None:
     """Without ZeroMQ each verb works, or says in one line what it needs."""
     done = without("zmq", tmp_path, "board-agent", verb, *_BOARD_ARGUMENTS.get(verb, ()))
@@ -149,4 +144,4 @@ def test_the_doctor_looks_for_every_package_of_the_host() -> None:
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     required = {line.partition(";")[0].rstrip(" .0123456789,<>=").lower() for line in project["dependencies"]}
     assert required == {_NAMES.get(module, module).lower() for module in _HOST_MODULES}
-    assert {"cv2", "msgpack", "numpy", "serial", "zmq", *_FURTHER_MODULES} == set(_HOST_MODULES)
+    assert {"cv2", "msgpack", "numpy", "serial", "zmq", *FURTHER_MODULES} == set(_HOST_MODULES)

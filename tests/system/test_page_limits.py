@@ -20,6 +20,11 @@ from tests.support.served_page import Start, next_pair, start, until, viewer  # 
 from tests.support.stereo_pages import processed
 
 
+def transport_of(viewer: aiohttp.ClientWebSocketResponse) -> asyncio.Transport:
+    """What a viewer reads from."""
+    return viewer._response.connection.transport  # type: ignore[union-attr, return-value]  # noqa: SLF001 - aiohttp hides it
+
+
 def test_a_slow_viewer_delays_no_fast_one(start: Start) -> None:
     """Beside one that never acknowledges and one that never reads, a third gets pair after pair; the two are closed in the end."""
     served = start(PageSource(processed(640, 480)), limits=Limits(silent_s=2.0))
@@ -27,7 +32,7 @@ def test_a_slow_viewer_delays_no_fast_one(start: Start) -> None:
     async def watch() -> None:
         want = {"views": ["left", "right", "disparity"], "width": 1920, "hz": 30}
         async with viewer(served, **want) as deaf, viewer(served, **want) as stuck, viewer(served, **want) as fast:
-            stuck._response.connection.transport.pause_reading()  # type: ignore[union-attr]
+            transport_of(stuck).pause_reading()
             served.source.show()
             await next_pair(deaf)
             seen: list[int] = []
@@ -40,7 +45,7 @@ def test_a_slow_viewer_delays_no_fast_one(start: Start) -> None:
             while (await deaf.receive(60)).type is not aiohttp.WSMsgType.CLOSED:
                 pass
             await asyncio.sleep(1)
-            stuck._response.connection.transport.resume_reading()  # type: ignore[union-attr]
+            transport_of(stuck).resume_reading()
             while (message := await stuck.receive(60)).type is aiohttp.WSMsgType.TEXT:
                 pass
             assert message.type in {aiohttp.WSMsgType.CLOSED, aiohttp.WSMsgType.ERROR}  # in the middle of a pair

@@ -48,7 +48,7 @@ def dialled(uri: str) -> int:
     except UnavailableError as error:
         print(error, file=sys.stderr)
         raise OSError from None
-    while isinstance(line := link._dialling(), Opening):
+    while isinstance(line := link.open_line(), Opening):
         time.sleep(_RETRY_S)
     return int(line.connected.detach())
 

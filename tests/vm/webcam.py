@@ -81,9 +81,9 @@ class Webcam:
         """What automatic modes find, if it differs from the original values."""
         self.set_requests: list[tuple[tuple[int, int], int]] = []
         """Every control that a driver has set, with the value, in order."""
-        self._frames, self._fps, self._readout_ns = frames, fps, readout_ns
-        self._smaller = smaller or frames
-        self._model = model or uvc.Model()
+        self.frames, self.fps, self.readout_ns = frames, fps, readout_ns
+        self.smaller = smaller or frames
+        self.model = model or uvc.Model()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._connection: socket.socket | None = None
         self._thread: threading.Thread | None = None
@@ -147,7 +147,7 @@ class _Device:
         self._camera, self._socket = camera, connection
         self._waiting: deque[tuple[int, int]] = deque()  # (sequence number, bytes) of transfers that want image data
         self._controls = camera.settings = {where: control.default for where, control in uvc.CONTROLS.items()}
-        self._probe = self._commit = camera._model.probe(1, 333333)
+        self._probe = self._commit = camera.model.probe(1, 333333)
         self._streaming = False
         self._odd = False
         self._number = 0
@@ -230,7 +230,7 @@ class _Device:
         return control.answer(request, self._controls[unit, selector])[:length]
 
     def _standard(self, request: int, value: int, length: int) -> bytes | None:
-        model = self._camera._model
+        model = self._camera.model
         if request == 6:  # GET_DESCRIPTOR
             kind, index = value >> 8, value & 0xFF
             known = {1: model.device, 2: model.configuration, 6: model.qualifier}
@@ -245,7 +245,7 @@ class _Device:
     def _negotiate(self, request: int, selector: int, out: bytes, length: int) -> bytes:
         if request == uvc.SET_CUR:
             _, _, frame, interval = struct.unpack_from("<HBBI", out)
-            self._probe = self._camera._model.probe(frame, interval)
+            self._probe = self._camera.model.probe(frame, interval)
             if selector == uvc.COMMIT:
                 self._commit = self._probe
                 self._start()
@@ -288,15 +288,15 @@ class _Device:
 
     def _rate_hz(self) -> int:
         interval: int = struct.unpack_from("<I", self._commit, 4)[0]
-        return min(self._camera._fps, round(1e7 / interval))
+        return min(self._camera.fps, round(1e7 / interval))
 
     def _image(self) -> int:
         """The image for the next number: at half the rate every other image is shown."""
-        return self._number * self._camera._fps // self._rate_hz()
+        return self._number * self._camera.fps // self._rate_hz()
 
     def _delay_ns(self) -> int:
         """Time from the middle of an exposure to the first byte."""
-        return (self._controls[uvc.EXPOSURE] * 100_000 + self._camera._readout_ns) // 2
+        return (self._controls[uvc.EXPOSURE] * 100_000 + self._camera.readout_ns) // 2
 
     def _feed(self) -> float:
         """Give image data to the waiting transfers; return how long there is nothing to do, s."""
@@ -327,10 +327,10 @@ class _Device:
         self._number += 1
         due_ns += round(skipped * 1e9 / self._rate_hz())
         due_ns -= self._phase_ns  # image k belongs to k / fps: any later exposure is reported as lateness
-        image = self._newest % len(camera._frames)
+        image = self._newest % len(camera.frames)
         camera.late_ns[image] = (now_ns - due_ns, now_ns - due_ns)
         self._first = (image, due_ns)
-        frames = camera._smaller if self._commit[3] == 2 else camera._frames  # bFrameIndex
+        frames = camera.smaller if self._commit[3] == 2 else camera.frames  # bFrameIndex
         frame = with_comment(frames[image], f"number={number}")
         if camera.truncate_every and number % camera.truncate_every == 0:
             camera.truncated += 1

@@ -41,11 +41,6 @@ def wall(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def first_url(client: Any) -> str:
-    """The address that the program printed."""
-    return f"{client.address}/?token={client._token}"
-
-
 def use(shown: Any, step: str, field: str, words: str) -> None:
     """Type an address into a step's field, and have it taken."""
     shown.evaluate("step => { location.hash = step; }", step)
@@ -86,7 +81,7 @@ def test_from_nothing_to_true_depth_on_the_page_alone(browser: Any, wall: Path, 
     shown.on("pageerror", lambda error: errors.append(str(error)))
     with page(["serve", "127.0.0.1:0"], tmp_path) as (ours, client):
         with board(theirs, tmp_path, "board1") as first:
-            shown.goto(first_url(client))
+            shown.goto(client.url)
             shown.wait_for_selector("#panel-board:not([hidden])")
             use(shown, "board", "link", f"ipc://{tmp_path}/link")
             use(shown, "camera", "camera", f"replay:{wall}/right?fps=10&loop=1")
@@ -147,7 +142,7 @@ def test_the_pairs_on_the_page_beside_a_run_are_pairs(browser: Any, tmp_path: Pa
     shown = browser.new_page(viewport={"width": 1200, "height": 800})
     shown.set_default_timeout(60_000)
     with page(ours, tmp_path) as (running, client), board(theirs, tmp_path):
-        shown.goto(first_url(client))
+        shown.goto(client.url)
         seen = []
         for _ in range(6):
             was = shown.get_attribute("#views", "data-pair")

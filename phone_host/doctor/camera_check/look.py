@@ -105,7 +105,7 @@ def look(window: Window) -> Reading:
         compared = compare(tracks, window.lens or guessed_lens(width, height), knows_lens=window.lens is not None)
     except np.linalg.LinAlgError:
         return Reading(Unseen.PLAIN, along=along)
-    return _judged(compared, tracks.seen, window.period_ms, along, across)
+    return judged(compared, tracks.seen, window.period_ms, along, across)
 
 
 def excess_of(compared: Compared) -> float:
@@ -114,7 +114,8 @@ def excess_of(compared: Compared) -> float:
     return math.sqrt(max(compared.rigid - compared.warped, 0.0) / max(2 * counted, 1))
 
 
-def _judged(compared: Compared, seen: Flags, period_ms: float, along: float, across: float) -> Reading:
+def judged(compared: Compared, seen: Flags, period_ms: float, along: float, across: float) -> Reading:
+    """Judge what the flow of two pictures shows, `period_ms` apart, with motion along and across the rows."""
     excess, unseen = excess_of(compared), None
     if (compared.trust > _COUNTS)[seen].mean() < _LEAST_SHARE:
         unseen = Unseen.LIVELY

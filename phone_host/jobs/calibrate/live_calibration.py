@@ -81,6 +81,10 @@ class LiveSettings:
 class LiveCalibration:
     """One live calibration.
 
+    Attributes:
+        guide: it; None: no board was seen yet.
+        lock: held by whoever reads or changes the guide.
+
     Args:
         settings: what to do.
         camera: the host camera, open.
@@ -101,9 +105,9 @@ class LiveCalibration:
             raise SettingsError("--camera has pace=demand, and so no clock", "give it fps= or pace=clock")
         self._settings, self._grow = settings, grow
         self._folders = ViewFolders(settings.left, settings.right, are_taken_live=True)
-        self._lock = Lock()
+        self.lock = Lock()
         self._began_ns = now.monotonic_ns()
-        self._guide: Guide | None = None
+        self.guide: Guide | None = None
         self._finder: BoardFinder | None = None
         self._size_finder = SizeFinder(settings.square_m)
         self._check: SizeCheck | None = None
@@ -140,10 +144,10 @@ class LiveCalibration:
             self._pictures.finish()
             self._folders.close(self.host.cameras_text())
         self._raise_failures()
-        with self._lock:
-            if self._guide is not None and self._guide.ended is Ended.RUNNING:
-                self._guide.ended = Ended.STREAM_ENDED if reason is EndReason.STREAM_ENDED else Ended.STOPPED
-        return self._ended if self._guide is not None else Ended.STOPPED
+        with self.lock:
+            if self.guide is not None and self.guide.ended is Ended.RUNNING:
+                self.guide.ended = Ended.STREAM_ENDED if reason is EndReason.STREAM_ENDED else Ended.STOPPED
+        return self._ended if self.guide is not None else Ended.STOPPED
 
     @property
     def trouble(self) -> str:
@@ -188,10 +192,10 @@ class LiveCalibration:
     def shown(self) -> tuple[GuideSnapshot, tuple[View, ...]]:
         """Return the snapshot, and the views that were taken by then."""
         now_ns = now.monotonic_ns()
-        with self._lock:
-            if self._guide is not None:
-                self._guide.words(now_ns)
-                return self._guide.snapshot(now_ns), tuple(self._guide.views)
+        with self.lock:
+            if self.guide is not None:
+                self.guide.words(now_ns)
+                return self.guide.snapshot(now_ns), tuple(self.guide.views)
         words = (
             Words.HELP if self.host.first_done_ns and now_ns - self.host.first_done_ns > _HELP_NS else Words.SHOW_BOTH
         )
@@ -199,7 +203,7 @@ class LiveCalibration:
 
     @property
     def _ended(self) -> Ended:
-        guide = self._guide  # once: the looker may drop it in between
+        guide = self.guide  # once: the looker may drop it in between
         return Ended.RUNNING if guide is None else guide.ended
 
     def _raise_failures(self) -> None:
@@ -210,20 +214,20 @@ class LiveCalibration:
     def _know(self, board: Board) -> None:
         self._finder = BoardFinder(board)
         self._check = SizeCheck(board) if self._settings.board is not None else None
-        with self._lock:
-            self._guide = Guide(board, self._settings.most_views, now.monotonic_ns(), self._settings.seen)
+        with self.lock:
+            self.guide = Guide(board, self._settings.most_views, now.monotonic_ns(), self._settings.seen)
 
     def _look(self, result: Result) -> None:
         """Look at a pair: called in the sink's thread."""
         self._looked_ns = now.monotonic_ns()
         pair = result.processed.pair
         left, right = to_grey(pair.left), to_grey(pair.right)
-        if self._guide is None or self._finder is None:
+        if self.guide is None or self._finder is None:
             board = self._size_finder.find(left, right)
             if board is not None:
                 self._know(board)
             return
-        guide, finder = self._guide, self._finder
+        guide, finder = self.guide, self._finder
 
         def glance(corners: tuple[Corners, Corners]) -> Glance:
             return Glance(
@@ -235,7 +239,7 @@ class LiveCalibration:
             )
 
         seen = glance(finder.find(left, right))
-        with self._lock:
+        with self.lock:
             gate = guide.see(seen, now.monotonic_ns())
         if gate is Gate.NOT_FOUND and not guide.views:
             self._missed(left, right)
@@ -251,15 +255,15 @@ class LiveCalibration:
             self._check.missed(left, right)
         elif self._misses >= _MISSES:
             self._misses, self._finder, self._size_finder = 0, None, SizeFinder(self._settings.square_m)
-            with self._lock:
-                self._guide = None
+            with self.lock:
+                self.guide = None
 
     def _examine(self, guide: Guide, exact: Glance, greys: tuple[Image, Image], images: tuple[Image, Image]) -> None:
         looks = [
             look_at(grey, corners, guide.board)
             for grey, corners in zip(greys, (exact.left_px, exact.right_px), strict=True)
         ]
-        with self._lock:
+        with self.lock:
             gate = guide.examine(exact, (looks[0], looks[1]), now.monotonic_ns())
             views = tuple(guide.views)
         if gate is Gate.TAKEN:
@@ -268,7 +272,7 @@ class LiveCalibration:
                 self._solver.offer(views)
 
     def _solve(self, views: tuple[View, ...]) -> None:
-        assert self._guide is not None
-        progress = self._grow(views, self._guide.board, views[0].glance.sizes_px)
-        with self._lock:
-            self._guide.grow(progress, now.monotonic_ns())
+        assert self.guide is not None
+        progress = self._grow(views, self.guide.board, views[0].glance.sizes_px)
+        with self.lock:
+            self.guide.grow(progress, now.monotonic_ns())

@@ -89,7 +89,7 @@ class Novice:
         self.plan = Plan((Stroke(now_s - 10, 1.0, start),))
         self._words, self._times, self._way = "", 0, 1
         self._middle_m = self.person.middle_m.copy()
-        self._acts_s, self._bored_s = np.inf, now_s + random.exponential(self.person.bored_s)
+        self._acts_s, self.bored_at_s = np.inf, now_s + random.exponential(self.person.bored_s)
 
     def hear(self, words: str, now_s: float) -> None:
         """Hear what is said. Whatever was said before and not done yet is forgotten."""
@@ -112,12 +112,12 @@ class Novice:
             self._acts_s = now_s + self._random.uniform(*self.person.patience_s)
             if self._times > 1 and self._random.random() < 0.5:  # a coin
                 self._way = 1  # it was not that way, it seems
-        elif now_s >= self._bored_s and not self._words.startswith(_HOLD):
+        elif now_s >= self.bored_at_s and not self._words.startswith(_HOLD):
             goal = self._stirred(self.plan.goal, 0.08, 12)
         else:
             return False
-        if now_s >= self._bored_s:
-            self._bored_s = now_s + self._random.exponential(self.person.bored_s)
+        if now_s >= self.bored_at_s:
+            self.bored_at_s = now_s + self._random.exponential(self.person.bored_s)
         self._move(goal, now_s)
         return True
 

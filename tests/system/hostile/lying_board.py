@@ -153,7 +153,7 @@ class LyingBoard:
 
     def say_parts(self, lane: Lane, parts: list[bytes]) -> None:
         """Send any number of parts likewise; none of our links does that."""
-        self._link._socket.send_multipart([self.lanes[lane], *parts])
+        self._link.router.send_multipart([self.lanes[lane], *parts])
 
     def begin_session(self, camera: CameraDescription) -> None:
         """Begin a new session with this camera, and have the host say hello again; call this from a job."""

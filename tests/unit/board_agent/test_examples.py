@@ -1,6 +1,5 @@
 """What the programs suggest is what they take: examples in every help, and what a bare name prints."""
 
-import argparse
 import ast
 import shlex
 import sys
@@ -15,6 +14,7 @@ import phone_host.bench.cli
 import phone_host.cli
 from common.program.invocation import PROGRAMS
 from common.versions import all_versions
+from tests.support.requests import verbs_in
 
 MAINS: dict[str, Callable[[list[str]], int]] = {
     "phone-host": phone_host.cli.main,
@@ -28,12 +28,7 @@ PARSERS = {
 }
 
 
-def verbs(program: str) -> list[str]:
-    actions = [item for item in PARSERS[program]()._actions if isinstance(item, argparse._SubParsersAction)]
-    return [name for action in actions for name in action.choices]
-
-
-CALLS = [(program, [verb] if verb else []) for program in PROGRAMS for verb in ("", *verbs(program))]
+CALLS = [(program, [verb] if verb else []) for program in PROGRAMS for verb in ("", *verbs_in(PARSERS[program]()))]
 named = pytest.mark.parametrize(
     ("program", "verb"), CALLS, ids=lambda value: " ".join(value) if isinstance(value, list) else value
 )

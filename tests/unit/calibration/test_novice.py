@@ -85,7 +85,7 @@ def test_the_novice_does_what_it_hears(words: str, component: int, sign: int) ->
     novice = Novice(np.random.default_rng(3), np.array([0.05, 0, 0]), 0.0)
     novice.person = replace(novice.person, mistakes=0.0, bored_s=1e9)
     novice.plan = Plan((Stroke(-10, 1, np.array([0.05, 0, 0.5, 0, 0, 0])),))
-    novice._bored_s = np.inf
+    novice.bored_at_s = np.inf
     before = novice.plan.at(0.0)
     novice.hear(words, 0.0)
     assert not novice.act(0.39)

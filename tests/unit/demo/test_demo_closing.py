@@ -10,7 +10,7 @@ import board_agent.cli
 import phone_host.cli
 from phone_host.demo.demonstration import DepthErrors
 from phone_host.scene.film import Film
-from phone_host.verbs.demo import _closing
+from phone_host.verbs.demo import closing
 
 ERRORS = DepthErrors(
     pairs=1,
@@ -31,7 +31,7 @@ ERRORS = DepthErrors(
 def test_the_next_commands_can_be_pasted(folder: str) -> None:
     """Whatever the folder's name, a shell takes each command apart as it was meant, and both programs take it."""
     out = Path(folder)
-    said = _closing(out, Film(left=out / "film" / "left", right=out / "film" / "right", frames=60, fps=15), ERRORS)
+    said = closing(out, Film(left=out / "film" / "left", right=out / "film" / "right", frames=60, fps=15), ERRORS)
     lines = said.partition("try next")[2].splitlines()[1:]
     board, host, bare, *activate = [shlex.split(line) for line in lines if line.startswith("  ")]
     assert Path(board[0]).name == "board-agent"
@@ -47,6 +47,6 @@ def test_without_activation_the_demo_says_how_the_programs_are_found(monkeypatch
     out = Path("out/demo")
     film = Film(left=out / "film" / "left", right=out / "film" / "right", frames=60, fps=15)
     monkeypatch.setenv("PATH", "/usr/bin:/bin")
-    assert "/activate" in _closing(out, film, ERRORS)
+    assert "/activate" in closing(out, film, ERRORS)
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent))
-    assert "/activate" not in _closing(out, film, ERRORS)
+    assert "/activate" not in closing(out, film, ERRORS)

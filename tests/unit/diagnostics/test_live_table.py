@@ -163,10 +163,10 @@ def test_a_limited_runs_bar_waits_for_the_first_pair_and_a_busy_board_is_named()
     with LiveTable(lambda: busy, console, seconds=5.0, refresh_s=0.0) as live:
         for _ in range(3):
             live.refresh()
-        assert live._progress.tasks[0].completed == 0.0
+        assert live.progress.tasks[0].completed == 0.0
         assert "the board is busy with another host: stop that one first" in drawn.getvalue()
         assert "waiting for the board" not in drawn.getvalue()
         busy = run(5)
         for _ in range(2):
             live.refresh()
-        assert 0.0 < live._progress.tasks[0].completed <= 5.0
+        assert 0.0 < live.progress.tasks[0].completed <= 5.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from phone_host.doctor.camera_check.look import RIGID, WARPED, Reading, _judged
+from phone_host.doctor.camera_check.look import RIGID, WARPED, Reading, judged
 from phone_host.doctor.camera_check.rigid import Compared
 from phone_host.model.capture import Unseen
 
@@ -24,7 +24,7 @@ def reading(excess: float, *, trust: float = 1.0, off_plane_px: float = 5.0, alo
         parallax_px=10.0,
         off_plane_px=off_plane_px,
     )
-    return _judged(compared, SEEN, 30.0, along, along)
+    return judged(compared, SEEN, 30.0, along, along)
 
 
 @pytest.mark.parametrize(

@@ -308,7 +308,7 @@ def test_a_view_that_is_taken_while_it_is_shown_is_shown_later(
     )
     with closing(open_link(parse_link(f"ipc://{tmp_path}/b", listens_by_default=False))) as link, closing(camera):
         live = LiveCalibration(settings, camera, [link], lambda *_: pytest.fail("nothing is to be calibrated"))
-        guide, at_s = live._guide, iter(range(1, 9))
+        guide, at_s = live.guide, iter(range(1, 9))
         assert guide is not None
 
         def take() -> None:
@@ -317,7 +317,7 @@ def test_a_view_that_is_taken_while_it_is_shown_is_shown_later(
             looks = BoardLook(2.0, 0.0, 0.0), BoardLook(2.0, 0.0, 0.0)
             assert guide.examine(seen, looks, seen.at_ns) is Gate.TAKEN
 
-        live._lock = _EagerLock(take)  # type: ignore[assignment]  # stands for the looker's thread
+        live.lock = _EagerLock(take)  # type: ignore[assignment]  # stands for the looker's thread
         shows = Lines()
         for count in (0, 1, 2):
             snapshot, views = live.shown()

@@ -7,7 +7,7 @@ from pathlib import Path
 import board_agent.cli
 import phone_host.bench.cli
 import phone_host.cli
-from tests.support.requests import verbs_of
+from tests.support.requests import options_of, verbs_of
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "options.txt"
 PARSERS = (phone_host.cli.parser, board_agent.cli.parser, phone_host.bench.cli.parser)
@@ -32,8 +32,7 @@ def options(parser: argparse.ArgumentParser) -> Iterator[str]:
     """The options of a program and its verbs, sorted: their order and groups may change."""
     for verb in verbs_of(parser).values():
         yield from options(verb)
-    own = [action for action in parser._actions if not isinstance(action, argparse._SubParsersAction)]
-    yield from sorted(f"{parser.prog} {described(action)}" for action in own)
+    yield from sorted(f"{parser.prog} {described(action)}" for action in options_of(parser))
 
 
 def current() -> str:

@@ -20,6 +20,7 @@ from phone_host.output.listed import LIST, ListedFolder
 from phone_host.output.move_up import STAGED
 from phone_host.output.result_files import claim, remove_results
 from phone_host.run.file_sink import NAMES, FileSink
+from tests.support.killed_at import killed_at
 from tests.unit.common.camera.test_replay import fill
 
 FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
@@ -28,13 +29,13 @@ FILES = ("left.png", "right.png", "disparity.pfm", "cloud.ply")
 def earlier_run(folder: Path) -> None:
     """What a run of three pairs leaves if it is killed in the middle of the last one."""
     results = FileSink(folder, 1)
-    assert results._own is not None
+    assert results.listed is not None
     for name in ("pair-000000", "pair-1000000"):
-        results._own.add(name)
+        results.listed.add(name)
         (folder / name).mkdir()
         for file in FILES:
             (folder / name / file).write_bytes(b"x")
-    results._own.add("pair-000002")
+    results.listed.add("pair-000002")
     (folder / "pair-000002.part").mkdir()
     (folder / "pair-000002.part" / f".left.png.{'0' * 16}.part").write_bytes(b"x")
     (folder / f".report.json.{'0' * 16}.part").write_bytes(b"x")
@@ -75,12 +76,11 @@ def test_a_run_again_and_again_in_one_folder(tmp_path: Path) -> None:
     """Each run replaces the one before, even one that was killed before its report."""
     for number in range(3):
         FileSink(tmp_path, 1).close({"number": number})
-    killed = FileSink(tmp_path, 1)
-    assert killed._own is not None
+    running = FileSink(tmp_path, 1)
     with pytest.raises(UnavailableError, match=f"is being written by process {os.getpid()}: wait for its end"):
         FileSink(tmp_path, 1)
-    killed._own.spare_staged()
-    killed._own._lock.release()
+    running.close({"number": 3})
+    assert killed_at(0, lambda: FileSink(tmp_path, 1)).code == 0
     assert (tmp_path / STAGED).is_dir()
     FileSink(tmp_path, 1).close({})
     assert sorted(path.name for path in tmp_path.iterdir()) == [LIST, "delays.jsonl", "report.json"]

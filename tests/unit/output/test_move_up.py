@@ -182,12 +182,14 @@ def test_a_plan_leads_to_nothing_but_our_results(tmp_path: Path) -> None:
 def test_what_was_staged_stays_until_the_next_one_stages(tmp_path: Path) -> None:
     """What a killed program has saved is there after another verb has claimed names, and goes with the next set."""
     write_set(tmp_path, "1", ("a.txt",))
-    folder = ListedFolder(tmp_path, NAMES)
-    folder.open()
-    folder.stage()
-    write_text(folder.place / "b.txt", "2")
-    folder.spare_staged()
-    folder._lock.release()  # as the kernel does for a killed process
+
+    def staged() -> None:
+        folder = ListedFolder(tmp_path, NAMES)
+        folder.open()
+        folder.stage()
+        write_text(folder.place / "b.txt", "2")
+
+    assert killed_at(0, staged).code == 0
     claim_elsewhere(tmp_path)
     assert (tmp_path / STAGED / "b.txt").read_text() == "2"
     write_set(tmp_path, "3", ("a.txt",))

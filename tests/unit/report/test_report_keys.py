@@ -39,17 +39,17 @@ _BY_NAME: Final = frozenset(
 """Keys whose inner keys are names of stages, sinks or reasons."""
 
 
-def _keys(value: object, inside: str = "") -> set[str]:
+def keys_of(value: object, inside: str = "") -> set[str]:
     """All keys of a report, without the names that stand for keys."""
     if isinstance(value, list | tuple):
-        return {key for inner in value for key in _keys(inner)}
+        return {key for inner in value for key in keys_of(inner)}
     if not isinstance(value, dict):
         return set()
     own = set() if inside in _BY_NAME else set(value)
-    return own | {key for name, inner in value.items() for key in _keys(inner, str(name))}
+    return own | {key for name, inner in value.items() for key in keys_of(inner, str(name))}
 
 
-def _described(*headings: str) -> set[str]:
+def described_words(*headings: str) -> set[str]:
     """The words in code type of some sections."""
     sections = [_TEXT.partition(f"\n## {heading}\n")[2].partition("\n## ")[0] for heading in headings]
     assert all(sections)
@@ -96,41 +96,41 @@ def _eventful_run() -> RunSnapshot:
 
 def test_every_key_of_a_report_of_stereo_is_described() -> None:
     """That of one pair, and that of several of which one failed."""
-    pair = replace(test_stereo_report._PAIR, trust=test_stereo_report._BAD)
+    pair = replace(test_stereo_report.PAIR, trust=test_stereo_report.BAD)
     failed = FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))
-    keys = _keys(pair_json(pair)) | _keys(set_json(SetReport(pairs=(pair, failed), by_number=True, drift=Drift())))
+    keys = keys_of(pair_json(pair)) | keys_of(set_json(SetReport(pairs=(pair, failed), by_number=True, drift=Drift())))
     assert len(keys - {"total"}) >= 55
-    assert keys <= _described("What `--json` prints", "report.json of `stereo`")
+    assert keys <= described_words("What `--json` prints", "report.json of `stereo`")
 
 
 def test_every_key_of_a_report_of_quality_is_described() -> None:
     """That of a pair with a plane, and of one that failed."""
-    keys = _keys(quality_json(quality_pages.report(failed=True)))
+    keys = keys_of(quality_json(quality_pages.report(failed=True)))
     assert len(keys) >= 40
-    assert keys <= _described("What `--json` prints", "report.json of `stereo`", "report.json of `quality`")
+    assert keys <= described_words("What `--json` prints", "report.json of `stereo`", "report.json of `quality`")
 
 
 def test_every_key_of_a_report_of_run_is_described() -> None:
     """That of a run with absences, doubts, losses and an alignment; what `stereo` has, too, is described there."""
-    keys = _keys(build(_eventful_run()))
+    keys = keys_of(build(_eventful_run()))
     assert len(keys) >= 120
-    assert keys <= _described("What `--json` prints", "report.json of `stereo`", "report.json of `run`")
+    assert keys <= described_words("What `--json` prints", "report.json of `stereo`", "report.json of `run`")
 
 
 def test_every_key_of_a_report_of_calibrate_is_described(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """That of a rig, and that of images which gave none."""
-    folder = test_calibrate_verb._folders(tmp_path, lambda image: encoded(".png", image))
-    _, report = test_calibrate_verb._calibrate(folder)
-    keys = _keys(report)
+    folder = test_calibrate_verb.folders(tmp_path, lambda image: encoded(".png", image))
+    _, report = test_calibrate_verb.calibrated(folder)
+    keys = keys_of(report)
     assert "written to" in capsys.readouterr().out
     assert len(keys) >= 30
-    assert keys <= _described("What `--json` prints", "report.json of `calibrate`")
+    assert keys <= described_words("What `--json` prints", "report.json of `calibrate`")
 
 
 def test_every_key_of_delay_bench_json_is_described() -> None:
     """Two interfaces and the predictions that follow from them."""
     results = [bench_results.result(), bench_results.result(link="ipc")]
     report = as_json(results, bench_results.UNDER, bench_results.analysed(*results))
-    keys = _keys(report)
+    keys = keys_of(report)
     assert len(keys) >= 70
-    assert keys <= _described("What `--json` prints", "delay-bench.json")
+    assert keys <= described_words("What `--json` prints", "delay-bench.json")

@@ -28,9 +28,9 @@ from phone_host.stereo.view_files import ViewFiles
 
 # 1000 pixels; f b = 50 px m, so an error of 0.25 px makes a depth of 40 m wrong by 0.25 * 40 / 50 = 20 %.
 _GOOD = PairTrust(ImageFigures(), (), Answer(Grade.GOOD, "Depth looks right."))
-_BAD = PairTrust(ImageFigures(), (no_depth(None, None),), Answer(Grade.BAD, "Depth is wrong."))
+BAD = PairTrust(ImageFigures(), (no_depth(None, None),), Answer(Grade.BAD, "Depth is wrong."))
 
-_PAIR = PairReport(
+PAIR = PairReport(
     name="",
     left="l.png",
     right="r.png",
@@ -52,7 +52,7 @@ _PAIR = PairReport(
 
 def test_what_was_cut_is_told_in_percent_with_the_limit_and_its_reason() -> None:
     """120 of 1000 pixels are farther than 40 m, where 0.25 px are a fifth of the disparity."""
-    [line] = cut_lines(_PAIR)
+    [line] = cut_lines(PAIR)
     assert "12 % farther than 40 m, where depth is wrong by more than 20%" in line
     assert "3.0 % too far to measure" in line
 
@@ -60,18 +60,18 @@ def test_what_was_cut_is_told_in_percent_with_the_limit_and_its_reason() -> None
 def test_limits_that_the_user_gave_have_no_other_reason() -> None:
     """--near 300mm and --far 2m are named, and no error is."""
     limits = DepthLimits(near_m=0.3, far_m=2.0, disparity_error_px=0.25, from_rig=False)
-    [line] = cut_lines(replace(_PAIR, limits=limits, cut=CutCounts(kept=980, too_far=10, too_near=10)))
+    [line] = cut_lines(replace(PAIR, limits=limits, cut=CutCounts(kept=980, too_far=10, too_near=10)))
     assert line == "cut: 1.0 % farther than 2 m; 1.0 % nearer than 300 mm"
 
 
 def test_a_pair_of_which_nothing_was_cut_says_where_its_cloud_ends() -> None:
     """The far limit is told all the same."""
-    assert cut_lines(replace(_PAIR, cut=CutCounts(kept=1000))) == ["points up to 40 m are kept"]
+    assert cut_lines(replace(PAIR, cut=CutCounts(kept=1000))) == ["points up to 40 m are kept"]
 
 
 def test_lines_of_a_pair_hold_its_size_search_density_points_and_axes() -> None:
     """The first line says whether the depth is right, the next two have what a user needs to judge it."""
-    answer, *lines = pair_lines(_PAIR, "scan")
+    answer, *lines = pair_lines(PAIR, "scan")
     assert answer == "Depth looks right."
     for words in ("40x25 px", "sgbm", "64 disparities", "matched at 50% of the size", "82.0%", "123 ms"):
         assert words in lines[0]
@@ -82,12 +82,12 @@ def test_lines_of_a_pair_hold_its_size_search_density_points_and_axes() -> None:
 
 def test_the_object_of_a_pair_states_limits_cuts_unit_and_axes() -> None:
     """Programs read them without words."""
-    told = pair_json(_PAIR)
+    told = pair_json(PAIR)
     assert told["limits"] == {"near_m": 0.0, "far_m": 40.0, "disparity_error_px": 0.25, "from_rig": True}
     assert (told["cut"]["too_far"], told["cut"]["kept"]) == (120, 700)
     assert (told["verdict"], told["headline"], told["trust"]["doubts"]) == ("good", "Depth looks right.", [])
     assert (told["unit"], told["scale"], told["disparities"], told["points"]) == ("metre", 0.5, 64, 700)
-    flat = pair_json(replace(_PAIR, geometry=None, limits=None, written=WrittenPair(files=())))
+    flat = pair_json(replace(PAIR, geometry=None, limits=None, written=WrittenPair(files=())))
     assert (flat["unit"], flat["axes"], flat["limits"]) == (None, None, None)
 
 
@@ -96,7 +96,7 @@ def _alike(count: int, *problems: str) -> SetReport:
     return SetReport(
         pairs=tuple(
             replace(
-                _PAIR,
+                PAIR,
                 name=f"pair-{number:06d}",
                 left=f"photos/Piano{number}L.png",
                 remarks=(Diagnostic(problems[number % len(problems)], "check the rig"),),
@@ -135,55 +135,55 @@ def test_pairs_without_numbers_of_their_own_are_told_with_a_file() -> None:
 
 def test_what_the_headline_tells_is_no_warning_beside_it() -> None:
     """A doubt is told once, by the headline with its remedy; report.json lists it all the same."""
-    remarks = (Diagnostic(_BAD.concerns[0].message, _BAD.concerns[0].remedy), Diagnostic("something else"))
-    bad = replace(_PAIR, trust=_BAD, remarks=remarks)
+    remarks = (Diagnostic(BAD.concerns[0].message, BAD.concerns[0].remedy), Diagnostic("something else"))
+    bad = replace(PAIR, trust=BAD, remarks=remarks)
     assert [line for line in pair_lines(bad, "scan") if line.startswith("warning")] == ["warning: something else"]
     assert len(pair_json(bad)["warnings"]) == 2
 
 
 def test_depths_beyond_a_16_bit_picture_are_a_note_and_no_warning() -> None:
     """Far points are no fault of the result."""
-    lines = pair_lines(replace(_PAIR, written=WrittenPair(files=("depth.png",), points=700, not_in_depth_png=12)), "s")
+    lines = pair_lines(replace(PAIR, written=WrittenPair(files=("depth.png",), points=700, not_in_depth_png=12)), "s")
     assert "note: 12 depths beyond 65.5 m (or below 1 mm) missing from depth.png" in lines
     assert not any(line.startswith("warning") for line in lines)
 
 
 def test_the_nearest_distance_searched_is_told_on_the_terminal_and_to_programs() -> None:
     """N = 64, so up to 63 px: f b = 50 px m are 50 / 63 = 0.794 m; with doffs of 17 px, 50 / 80 = 0.625 m; px alone tell none."""
-    assert "searched from 794 mm" in pair_lines(_PAIR, "scan")[1]
-    assert pair_json(_PAIR)["searched_from_m"] == pytest.approx(50 / 63, abs=1e-4)
-    assert _PAIR.geometry is not None
-    shifted = replace(_PAIR, geometry=replace(_PAIR.geometry, doffs_px=17))
+    assert "searched from 794 mm" in pair_lines(PAIR, "scan")[1]
+    assert pair_json(PAIR)["searched_from_m"] == pytest.approx(50 / 63, abs=1e-4)
+    assert PAIR.geometry is not None
+    shifted = replace(PAIR, geometry=replace(PAIR.geometry, doffs_px=17))
     assert shifted.searched_from_m == pytest.approx(0.625)
-    assert pair_json(replace(_PAIR, geometry=None))["searched_from_m"] is None
+    assert pair_json(replace(PAIR, geometry=None))["searched_from_m"] is None
 
 
 def test_pixels_outside_the_crop_do_not_lower_the_share() -> None:
     """700 points of the 800 pixels inside the crop are 87.5 %; without metres the share is that of the disparities."""
-    assert replace(_PAIR, cut=CutCounts(kept=700, unmatched=100, outside=200)).share == pytest.approx(0.875)
-    assert replace(_PAIR, written=WrittenPair(files=())).share == 0.82
+    assert replace(PAIR, cut=CutCounts(kept=700, unmatched=100, outside=200)).share == pytest.approx(0.875)
+    assert replace(PAIR, written=WrittenPair(files=())).share == 0.82
 
 
 @pytest.mark.parametrize(
     ("report", "sound"),
     [
-        (SetReport(pairs=(_PAIR,), by_number=True), True),
-        (SetReport(pairs=(_PAIR,), by_number=True, remarks=(Diagnostic("2 left images have no partner"),)), True),
+        (SetReport(pairs=(PAIR,), by_number=True), True),
+        (SetReport(pairs=(PAIR,), by_number=True, remarks=(Diagnostic("2 left images have no partner"),)), True),
         (
             SetReport(
-                pairs=(replace(_PAIR, remarks=(Diagnostic("same image", severity=Severity.FAIL),)),), by_number=True
+                pairs=(replace(PAIR, remarks=(Diagnostic("same image", severity=Severity.FAIL),)),), by_number=True
             ),
             False,
         ),
         (
             SetReport(
-                pairs=(_PAIR, FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))),
+                pairs=(PAIR, FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))),
                 by_number=True,
             ),
             False,
         ),
-        (SetReport(pairs=(replace(_PAIR, written=WrittenPair(files=(), points=0)),), by_number=True), False),
-        (SetReport(pairs=(replace(_PAIR, density=0.0, written=WrittenPair(files=())),), by_number=True), False),
+        (SetReport(pairs=(replace(PAIR, written=WrittenPair(files=(), points=0)),), by_number=True), False),
+        (SetReport(pairs=(replace(PAIR, density=0.0, written=WrittenPair(files=())),), by_number=True), False),
     ],
     ids=["good", "alone", "blocking", "failed", "all cut", "nothing matched"],
 )
@@ -215,10 +215,10 @@ def test_images_without_partner_are_counted_and_named_and_pairing_by_order_is_to
 
 def test_the_verdict_of_several_pairs_counts_them() -> None:
     """All good is good, all bad is bad, anything else is told in numbers."""
-    bad = replace(_PAIR, trust=_BAD)
+    bad = replace(PAIR, trust=BAD)
     failed = FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))
-    assert set_verdict(SetReport(pairs=(_PAIR, _PAIR), by_number=True))[0] is Headline.GOOD
+    assert set_verdict(SetReport(pairs=(PAIR, PAIR), by_number=True))[0] is Headline.GOOD
     assert set_verdict(SetReport(pairs=(bad, failed), by_number=True))[0] is Headline.BAD
-    verdict, sentence = set_verdict(SetReport(pairs=(_PAIR, failed, bad), by_number=True))
+    verdict, sentence = set_verdict(SetReport(pairs=(PAIR, failed, bad), by_number=True))
     assert verdict is Headline.WARNING
     assert sentence == "1 of 3 pairs looks right, 2 gave no depth or cannot be right."

@@ -9,7 +9,7 @@ import pytest
 from common import now
 from phone_host.calibration.drift.see import Timed
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Processed, Result, Side
-from phone_host.run.drift_keeper import DriftKeeper, Moment, _say
+from phone_host.run.drift_keeper import DriftKeeper, Moment, log_change
 from phone_host.scene.scene import demo_scene, render, rig_poses
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.departure import corrected_rig
@@ -128,7 +128,7 @@ def test_a_jump_of_the_focus_is_logged_as_one(kind: ChangeKind, caplog: pytest.L
     """Where only the focal length is proven to have changed, the remedy is the focus and not the bar."""
     zoomed, turned_too = Departure(focal=1.03), Departure(turn_rad=(0.05, 0.0, 0.0), focal=1.03)
     for departure in (zoomed, turned_too):
-        _say(Change(kind=kind, at_s=3.0, departure=departure, step=departure), Drift())
+        log_change(Change(kind=kind, at_s=3.0, departure=departure, step=departure), Drift())
     focus, bar = (record.getMessage() for record in caplog.records)
     assert "autofocus" in focus
     assert "bar" in bar

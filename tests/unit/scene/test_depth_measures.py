@@ -14,7 +14,7 @@ from tests.bench.depth_boards import View, view_scores
 from tests.bench.depth_choice import choices
 from tests.bench.depth_confidence import curve, relative_area
 from tests.bench.depth_parts import evaluate_parts
-from tests.bench.depth_rooms import PARTS, Room, _parts, furnished, view_of
+from tests.bench.depth_rooms import PARTS, Room, furnished, parts_of, view_of
 from tests.bench.depth_scenes import Image
 from tests.bench.match_limit import OPERATIONS, Peak
 from tests.bench.room_painter import Paint, Painted, paint_view
@@ -162,7 +162,7 @@ def test_what_a_rooms_pixels_show_is_known() -> None:
     painted = Painted(Scene((wall,)), (Paint(plain_beyond_m=0.25),))
     view = view_of(640)
     exact = truth(painted.scene, view)
-    parts = _parts(painted, exact.body, exact.depth_m, pixel_rays(rectified_cameras(view)[0][0]))
+    parts = parts_of(painted, exact.body, exact.depth_m, pixel_rays(rectified_cameras(view)[0][0]))
     # f = 525 px at 2 m: the wall ends 262.5 px from the middle, at column 319.5, and is bare from 65.6 px right of it.
     row = [PARTS[part] for part in parts[240]]
     assert row == ["nothing"] * 57 + ["wall"] * (386 - 57) + ["plain"] * (583 - 386) + ["nothing"] * (640 - 583)

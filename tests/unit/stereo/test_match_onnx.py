@@ -137,10 +137,13 @@ def test_small_and_odd_sizes_work(size: tuple[int, int], tmp_path: Path) -> None
 def test_the_file_is_read_anew_when_it_has_changed(tmp_path: Path) -> None:
     """A network that is replaced by another is not taken from memory."""
     path = block_network(tmp_path / "net.onnx")
-    _matcher(path)
-    block_network(path, Form(size=(30, 60)))
+    pair, other = _pair(90, 40, 3), Form(size=(30, 60))
+    before = _matcher(path).match(pair)
+    block_network(path, other)
     os.utime(path, ns=(1, 1))
-    assert _matcher(path)._layout.width_px == 60
+    after = _matcher(path).match(pair)
+    assert np.array_equal(after, _matcher(block_network(tmp_path / "other.onnx", other)).match(pair), equal_nan=True)
+    assert not np.array_equal(after, before, equal_nan=True)
 
 
 def test_names_are_read() -> None:

@@ -11,11 +11,11 @@ import pytest
 from common import now
 from common.errors import AbsentBoardError, BusyBoardError, OtherVersionError, UnavailableError
 from common.link.factory import open_link, parse_link
-from common.protocol.message import Lane, RefusalReason
+from common.protocol.message import RefusalReason
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver
-from phone_host.stream.refusals import BoardRefusal
+from phone_host.stream.refusals import BoardRefusal, Refusals
 
 S = 1_000_000_000
 LOOKS = 200_000
@@ -120,20 +120,16 @@ def test_a_receivers_failure_ends_the_wait(tmp_path: Path) -> None:
             await_board(receiver, BoardPatience(None, 0), lambda: False)
 
 
-def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> None:
+def test_a_refusal_that_ends_while_it_is_told_is_a_refusal() -> None:
     """The receiver's thread may withdraw a refusal at any moment: the waiting thread sees a whole refusal or none."""
-    receiver = Receiver(
-        [open_link(parse_link(f"ipc://{tmp_path}/board", listens_by_default=False))], "host", NoFrames()
-    )
-    reception = receiver._reception
-    dialled = reception._links[0].dialled[Lane.CONTROL]
+    refusals = Refusals()
     done, seen = threading.Event(), {True: 0, False: 0}
 
     def flicker() -> None:
         while not done.is_set():
-            reception.refuse_version(dialled, 4, now.monotonic_ns())
+            refusals.note(BoardRefusal(RefusalReason.VERSION, protocol=4), now.monotonic_ns())
             sum(range(200))  # neither state may be so short that the threads never meet in it
-            reception._refusals.accepted()  # as when a board accepts
+            refusals.accepted()  # as when a board accepts
             sum(range(200))
 
     usual_s = sys.getswitchinterval()
@@ -143,7 +139,7 @@ def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> No
     try:
         for _ in range(LOOKS):
             try:
-                BoardPatience(None, 0).look(now.monotonic_ns(), receiver.refused, present=False)
+                BoardPatience(None, 0).look(now.monotonic_ns(), refusals.last(now.monotonic_ns()), present=False)
             except OtherVersionError:
                 seen[True] += 1
             else:
@@ -154,6 +150,4 @@ def test_a_refusal_that_ends_while_it_is_told_is_a_refusal(tmp_path: Path) -> No
         done.set()
         thread.join(60)
         sys.setswitchinterval(usual_s)
-        receiver.start()
-        receiver.stop()
     assert min(seen.values()) > 500, f"the threads never met: {seen}"

@@ -137,7 +137,7 @@ def test_frames_wait_while_an_echo_lies_and_come_back_by_themselves() -> None:
     talk.run(40)
     talk.show(talk.frame())
     talk.run(10)
-    wave = talk.reception._session._paths[0].waves._wave
+    wave = talk.wave
     told_ns = talk.now_ns + 3_600_000_000_000
     talk.reception.receive(
         NAMES[Lane.CONTROL], Pong(wave=wave, t0_ns=talk.now_ns - MS, t1_ns=told_ns, t2_ns=told_ns), talk.now_ns
@@ -269,10 +269,10 @@ def test_links_to_two_boards_are_an_error_unless_one_was_moved() -> None:
     talk.run(60)
     moved = OtherBoard(1, other)
     talk.reception.account.links[1].lost = 1
-    talk.reception._handle([moved], talk.now_ns)
+    talk.reception.handle([moved], talk.now_ns)
     talk.reception.account.links[1].lost = 0
     with pytest.raises(UnavailableError) as caught:
-        talk.reception._handle([moved], talk.now_ns)
+        talk.reception.handle([moved], talk.now_ns)
     assert "theirs" in caught.value.problem
     assert "--link" in caught.value.remedy
 
@@ -282,7 +282,7 @@ def test_a_link_that_is_turned_away_is_told_once(caplog: pytest.LogCaptureFixtur
     talk = TwoLinks()
     talk.run(60)
     for _ in range(5):
-        talk.reception._handle([Refused(RefusalReason.BUSY, 1)], talk.now_ns)
+        talk.reception.handle([Refused(RefusalReason.BUSY, 1)], talk.now_ns)
     assert len([record for record in caplog.records if "link_refused" in record.getMessage()]) == 1
     assert talk.reception.connected
     assert talk.reception.refused(talk.now_ns) == BoardRefusal(RefusalReason.BUSY)
@@ -303,7 +303,7 @@ def test_nonsense_is_counted_and_told_ever_more_seldom(caplog: pytest.LogCapture
     talk.run()
     for _ in range(99):
         talk.reception.count_garbage("noise")
-    talk.reception._handle([Unbelievable("noise")], talk.now_ns)
+    talk.reception.handle([Unbelievable("noise")], talk.now_ns)
     assert talk.reception.account.garbage == 100
     assert len([record for record in caplog.records if "garbage" in record.getMessage()]) == 7
 
@@ -313,17 +313,34 @@ def test_a_board_that_steps_to_a_lower_rate_is_gone_by() -> None:
     talk = Talk()
     talk.run()
     rung = Rung(index=2, last=3, period_ns=2 * CAMERA.period_ns)
-    talk.reception._handle([Stepped(rung)], talk.now_ns)
+    talk.reception.handle([Stepped(rung)], talk.now_ns)
     hello = talk.reception.hello
     assert hello is not None
     assert (hello.camera.period_ns, hello.rung) == (2 * CAMERA.period_ns, rung)
     assert talk.reception.account.sessions[-1].rung == rung
 
 
+def test_another_boot_is_another_clock() -> None:
+    """When the board's process comes back, the host keeps what it knows of the clock; when the machine has rebooted, it begins anew."""
+    talk = Talk()
+    talk.run(60)
+    known = {}
+    for session, boot_id in (("second", "boot"), ("third", "another boot")):
+        talk.begin(session, boot_id)
+        seen = []
+        while talk.reception.hello is None or talk.reception.hello.session != session:
+            talk.run(1)
+            seen.append(talk.reception.estimate is not None)
+        known[session] = all(seen)
+        talk.run(60)
+        assert talk.reception.estimate is not None
+    assert known == {"second": True, "third": False}
+
+
 UPSETS: dict[str, Callable[[Talk], None]] = {
     "slept": lambda talk: talk.reception.slept(3_600_000 * MS, talk.now_ns),
     "may have slept": lambda talk: talk.reception.doubt_clock("stopped", talk.now_ns),
-    "was not heard": lambda talk: talk.reception._handle([ClockVoid()], talk.now_ns),
+    "was not heard": lambda talk: talk.reception.handle([ClockVoid()], talk.now_ns),
 }
 
 

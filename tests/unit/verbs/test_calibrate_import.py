@@ -16,7 +16,7 @@ from phone_host.output.rig_views import RigViews
 from phone_host.output.rig_yaml import read_rig, read_rig_views, write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.unit.output.test_rig_files_kalibr import KALIBR
-from tests.unit.report.test_report_keys import _described, _keys
+from tests.unit.report.test_report_keys import described_words, keys_of
 
 _UPRIGHT = KALIBR.replace("- [0.0, -1.0, 0.0, 0.0]", "- [1, 0, 0, -0.12]").replace(
     "- [1.0, 0.0, 0.0, -0.12]", "- [0, 1, 0, 0]"
@@ -57,7 +57,9 @@ def test_a_rig_is_exported_into_folders_beside_it(
     words = ["--export", "ros", "--export", "kalibr", "--export", "ros", "--export", "euroc"]
     _told(capsys, "calibrate", "--import", out, *words, "--out", out)
     told = _told(capsys, "calibrate", "--import", out, *words, "--out", out)  # which replaces them
-    assert _keys(told) - set(told["exported"]) <= _described("What `--json` prints", "report.json of `calibrate`")
+    assert keys_of(told) - set(told["exported"]) <= described_words(
+        "What `--json` prints", "report.json of `calibrate`"
+    )
     assert sorted(told["exported"]) == ["euroc", "kalibr", "ros"]
     assert (out.read_bytes(), (tmp_path / "report.json").read_bytes()) == before
     for kind in ("ros", "kalibr", "euroc"):

@@ -33,7 +33,7 @@ from tests.support.rigs import small_rig
 _PAIRS = [render_pair(small_rig(), pose) for pose in poses(4, seed=8, depth_m=(0.4, 0.5))]
 
 
-def _folders(folder: Path, right: Callable[[Image], bytes]) -> Path:
+def folders(folder: Path, right: Callable[[Image], bytes]) -> Path:
     """Two folders of four photographs; `right` makes the right images' files."""
     for side in ("left", "right"):
         (folder / side).mkdir()
@@ -50,7 +50,7 @@ def _shaken(image: Image) -> Image:
     return np.asarray(cv2.remap(image, columns.astype(np.float32), moved, cv2.INTER_LINEAR), np.uint8)
 
 
-def _calibrate(folder: Path, *options: str, images: tuple[str, ...] = ()) -> tuple[int, dict[str, Any]]:
+def calibrated(folder: Path, *options: str, images: tuple[str, ...] = ()) -> tuple[int, dict[str, Any]]:
     """Exit code and report.json; `images` in place of the folders left and right."""
     given = [*(images or (str(folder / "left"), str(folder / "right"))), "--board", "9x6", "--square", "25mm", *options]
     code = run(request_of("calibrate", *given, "--out", str(folder / "rig.yaml")))
@@ -71,8 +71,8 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Right images whose columns shake by 2 px leave rows that do not match: exit 4, verdict reject in rig.yaml; the good rig stays in rig.yaml.old, also after a second time."""
-    folder = _folders(tmp_path, lambda image: encoded(".png", image))
-    code, report = _calibrate(folder)
+    folder = folders(tmp_path, lambda image: encoded(".png", image))
+    code, report = calibrated(folder)
     good = read_rig(folder / "rig.yaml")
     assert (code, good.verdict) == (0, Verdict(report["verdict"]))
     assert good.zero_sigma_px > 0
@@ -81,7 +81,7 @@ def test_a_rejected_rig_is_written_as_such_and_a_good_one_is_kept_aside(
     for earlier in ("rig.yaml.old", None):
         for index, pair in enumerate(_PAIRS):
             (folder / "right" / f"{index}.png").write_bytes(encoded(".png", _shaken(pair[1])))
-        code, report = _calibrate(folder)
+        code, report = calibrated(folder)
         assert (code, report["verdict"], report.get("earlier_rig")) == (4, "reject", earlier)
         assert read_rig(folder / "rig.yaml").is_rejected
         assert read_rig(folder / "rig.yaml.old").verdict == good.verdict
@@ -92,10 +92,10 @@ def test_a_rig_that_cannot_be_rectified_has_no_column_of_vertical_errors(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Left and right exchanged calibrate, but no rows can be compared: the table shows no `nan`."""
-    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    folder = folders(tmp_path, lambda image: encoded(".png", image))
     for name, other in (("left", "a"), ("right", "left"), ("a", "right")):
         (folder / name).rename(folder / other)
-    code, report = _calibrate(folder)
+    code, report = calibrated(folder)
     assert (code, report["verdict"], report["vertical_error_px"]["p95"]) == (4, "reject", None)
     told = capsys.readouterr().out
     assert "left px" in told
@@ -105,12 +105,12 @@ def test_a_rig_that_cannot_be_rectified_has_no_column_of_vertical_errors(
 
 def test_exif_headers_that_disagree_with_the_rig_are_told_with_the_option_that_helps(tmp_path: Path) -> None:
     """Two phones stand alike, but the right one wrote EXIF 6 when it lay flat: the remedy names the turn, and with it the true baseline comes."""
-    folder = _folders(tmp_path, lambda image: oriented(".png", image, 6))
-    _, report = _calibrate(folder)
+    folder = folders(tmp_path, lambda image: oriented(".png", image, 6))
+    _, report = calibrated(folder)
     assert report["exif_orientation"] == {"right": {"rotate_deg": 90, "flip": "none"}}
     assert "EXIF headers differ" in report["remedy"]
     assert "--rotate-right 270" in report["remedy"]
-    code, report = _calibrate(folder, "--rotate-right", "270")
+    code, report = calibrated(folder, "--rotate-right", "270")
     assert code == 0
     true_mm = float(np.linalg.norm(small_rig().t_right_left_m)) * 1e3
     assert report["baseline_mm"] == pytest.approx(true_mm, rel=0.02)
@@ -123,9 +123,9 @@ def test_mirrored_pictures_are_told_with_the_option_that_helps(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The right images are mirrored: exit 4 and --flip-right h as the only remedy; with it the true baseline comes."""
-    folder = _folders(tmp_path, lambda image: encoded(".png", image[:, ::-1].copy()))
+    folder = folders(tmp_path, lambda image: encoded(".png", image[:, ::-1].copy()))
     try:
-        code, report = _calibrate(folder)
+        code, report = calibrated(folder)
     except DataError as error:  # too few pairs fit each other at all
         code, report = error.exit_code, json.loads((folder / "report.json").read_text())
     assert (code, report["verdict"]) == (4, "reject")
@@ -133,7 +133,7 @@ def test_mirrored_pictures_are_told_with_the_option_that_helps(
         "mirrored against the left ones: switch mirroring off in that camera, or add --flip-right h"
     )
     capsys.readouterr()
-    code, report = _calibrate(folder, "--flip-right", "h")
+    code, report = calibrated(folder, "--flip-right", "h")
     assert code == 0
     assert report["baseline_mm"] == pytest.approx(float(np.linalg.norm(small_rig().t_right_left_m)) * 1e3, rel=0.02)
 
@@ -142,7 +142,7 @@ def test_folders_out_of_step_are_told_before_anything_is_fitted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Names that share neither numbers nor words, and the second right picture missing: a warning that order was guessed, and the left picture to delete."""
-    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    folder = folders(tmp_path, lambda image: encoded(".png", image))
     for side, names in (("left", ("ant", "bee", "cat", "dog")), ("right", ("ape", "bat", "cow", "doe"))):
         for index, name in enumerate(names):
             (folder / side / f"{index}.png").rename(folder / side / f"{name}.png")
@@ -150,7 +150,7 @@ def test_folders_out_of_step_are_told_before_anything_is_fitted(
     with pytest.raises(
         DataError, match=r"missing on the right: the folders are out of step from bee\.png on"
     ) as caught:
-        _calibrate(folder)
+        calibrated(folder)
     assert "delete bee.png on the left" in caught.value.remedy
     assert capsys.readouterr().out.startswith(
         "warning  4 left and 3 right pictures were paired in the order of their names"
@@ -177,11 +177,11 @@ def test_marks_that_are_not_there_are_not_called_a_chessboard(
     tmp_path: Path, paint: int | None, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """--board charuco:... of pictures that show a chessboard, or nothing: the error says what they show, and what the option counts."""
-    folder = _folders(tmp_path, lambda image: encoded(".png", image))
+    folder = folders(tmp_path, lambda image: encoded(".png", image))
     for path in folder.glob("*/*.png") if paint is not None else ():
         path.write_bytes(encoded(".png", np.full((240, 320), paint, np.uint8)))
     with pytest.raises(DataError) as caught:
-        _calibrate(folder, "--board", "charuco:8x6:25mm:18mm:5x5")
+        calibrated(folder, "--board", "charuco:8x6:25mm:18mm:5x5")
     assert said in str(caught.value)
     assert "too few of the board's marks are seen in either image" in capsys.readouterr().out
 
@@ -216,7 +216,7 @@ def test_a_measured_baseline_is_compared_and_not_asked_for(measured_m: float, as
 
 def test_a_recording_gives_the_rig_of_its_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The same pictures, a second apart: the same figures as from folders, and the board's side is that of the recording."""
-    folders = _calibrate(_folders(tmp_path, lambda image: encoded(".png", image)))[1]
+    by_folders = calibrated(folders(tmp_path, lambda image: encoded(".png", image)))[1]
     path = tmp_path / "again" / "s.mcap"
     path.parent.mkdir()
     with written(path) as file:
@@ -227,8 +227,8 @@ def test_a_recording_gives_the_rig_of_its_pictures(tmp_path: Path, capsys: pytes
                 shown = RecordedImage(at_ns, side, PixelFormat.PNG, (0, 0), encoded(".png", image))
                 topic = image_topic(side, COMPRESSED_IMAGE)
                 file.add(topic, image_message(shown), sequence=number, log_ns=at_ns, publish_ns=at_ns)
-    recorded = _calibrate(path.parent, images=(str(path),))[1]
+    recorded = calibrated(path.parent, images=(str(path),))[1]
     assert read_rig(path.parent / "rig.yaml").board_side is Side.RIGHT
     for key in ("pairs", "views", "baseline_mm", "rms_px", "verdict"):
-        assert recorded[key] == folders[key]
+        assert recorded[key] == by_folders[key]
     capsys.readouterr()

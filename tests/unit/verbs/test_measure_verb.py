@@ -18,7 +18,7 @@ from phone_host.scene.scene import Look, plane_scene, render, rig_poses
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.overlays import write_turned
 from tests.support.rigs import small_rig
-from tests.unit.report.test_report_keys import _described, _keys
+from tests.unit.report.test_report_keys import described_words, keys_of
 
 _WALL = plane_scene(1.2, tilt_rad=0.4, seed=5)
 _POINTS = ((100.0, 120.0), (180.5, 90.25), (150.0, 180.0))
@@ -70,7 +70,7 @@ def test_distances_hold_the_truth(folder: Path, capsys: pytest.CaptureFixture[st
         assert np.linalg.norm(point["point_mm"]) == pytest.approx(point["distance_mm"]["value"], abs=0.01)
     for part, (one, other) in zip(told["between"], pairwise(true), strict=True):
         assert part["length_mm"]["low"] < float(np.linalg.norm(one - other)) < part["length_mm"]["high"]
-    assert _keys(told) <= _described("What `--json` prints", "What `measure` prints as JSON")
+    assert keys_of(told) <= described_words("What `--json` prints", "What `measure` prints as JSON")
     assert told["uncertainty"]["includes"] == ["noise of both images", "the rig's zero (zero_sigma)"]
 
 
@@ -151,7 +151,7 @@ def test_one_bad_point_leaves_the_others(folder: Path, capsys: pytest.CaptureFix
     told: dict[str, Any] = json.loads(capsys.readouterr().out)
     assert "problem" in told["points"][1]
     assert [part["length_mm"] for part in told["between"]] == [None, None]
-    assert _keys(told) <= _described("What `--json` prints", "What `measure` prints as JSON")
+    assert keys_of(told) <= described_words("What `--json` prints", "What `measure` prints as JSON")
     assert _measure(folder, "--points", "100,120", "150,180", "--json") == 0
     alone: dict[str, Any] = json.loads(capsys.readouterr().out)
     assert [told["points"][0], told["points"][2]] == alone["points"]

@@ -46,8 +46,8 @@ def grown(views: tuple[View, ...], verdict: Verdict, *taught: Taught, hopeless: 
 class Show:
     """Shows boards to a guide, ten times a second."""
 
-    def __init__(self, most_views: int = 25) -> None:
-        self.guide = Guide(BOARD, most_views, 0)
+    def __init__(self, most_views: int = 25, seen: frozenset[Want] = frozenset()) -> None:
+        self.guide = Guide(BOARD, most_views, 0, seen)
         self.now_ns = 0
 
     def show(
@@ -143,7 +143,8 @@ def test_a_verdict_promises_nothing_of_corners_that_were_not_seen() -> None:
     show = Show()
     shown = [corners(0.34, 0.36), corners(0.66, 0.36), corners(0.34, 0.64)]
     shown += [tilted(a, b) for a, b in ((25, 0), (-25, 0), (0, 25), (0, -25))]
-    for view in (*shown, corners(square=0.03), corners(square=0.06), corners(0.28, 0.5, 0.03)):
+    held = (*shown, corners(square=0.03), corners(square=0.06), corners(0.28, 0.5, 0.03))
+    for view in held:
         show.show(view, 7.0)
     guide = show.guide
     assert len(guide.views) == 10
@@ -155,10 +156,11 @@ def test_a_verdict_promises_nothing_of_corners_that_were_not_seen() -> None:
     assert guide.ended is Ended.RUNNING, "asked for three times in vain, but a minute and a half is not over"
     show.show(corners(), 60.0)
     assert (guide.ended, show.words) == (Ended.ENOUGH, "done: verdict usable"), "it cannot be shown, it seems"
-    known = Guide(BOARD, 25, 0, CORNERS)
-    known.views, known._places = guide.views, guide._places
-    known.grow(grown(tuple(guide.views), Verdict.GOOD), show.now_ns)
-    assert known.ended is Ended.GOOD, "an earlier calibration saw the corners"
+    known = Show(seen=CORNERS)
+    for view in held:
+        known.show(view, 7.0)
+    known.guide.grow(grown(tuple(known.guide.views), Verdict.GOOD), known.now_ns)
+    assert known.guide.ended is Ended.GOOD, "an earlier calibration saw the corners"
 
 
 def test_only_good_is_lowered_by_unseen_corners() -> None:

@@ -41,7 +41,7 @@ def test_both_lanes_of_a_link_that_is_refused_are_dialled_again(tmp_path: Path) 
     keys = acquainted(tmp_path, address)[1]
     dialler = ZeroMqDialer(address, keys, keys.peers()[0])
     try:
-        lanes = dialler._connections.values()
+        lanes = dialler.connections.values()
         until(lambda: all(lane.news.has_news() for lane in lanes), "both lanes have news")
         waiter = Waiter([lane.news for lane in lanes])
         refusals = receive(dialler)

@@ -23,7 +23,7 @@ from common.program.quantities import (
 )
 from phone_host.bench.cases import Size, parse_qualities, parse_rates, parse_sizes
 from phone_host.settings import most_pixels, resolve_settings
-from tests.support.requests import verbs_of
+from tests.support.requests import options_of, verbs_of
 
 Parser = Callable[[], argparse.ArgumentParser]
 HOST, BOARD, BENCH = phone_host.cli.parser, board_agent.cli.parser, phone_host.bench.cli.parser
@@ -101,7 +101,7 @@ def test_no_option_for_a_time_is_forgotten() -> None:
         actions = [
             (one.prog, action)
             for one in parsers
-            for action in one._actions
+            for action in options_of(one)
             if action.metavar in {"S", "MS"} and action.dest != "scale"
         ]
         forgotten += [

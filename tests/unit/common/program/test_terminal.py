@@ -115,10 +115,10 @@ import sys
 sys.path.insert(0, {root!r})
 from phone_host.bench.analysis import analyse
 from phone_host.bench.changes import parse_changes
-from phone_host.bench.command import _print
+from phone_host.bench.command import print_results
 from tests.support.bench_results import UNDER, result
 results = [result(link=link) for link in ("tcp", "ipc", "tcp://192.168.107.222:55555?a=1&b=2&c=3&d=4")]
-_print(results, UNDER, analyse(results, UNDER.fifo, parse_changes(["fps=60,link=bluetooth"])))
+print_results(results, UNDER, analyse(results, UNDER.fifo, parse_changes(["fps=60,link=bluetooth"])))
 """
 
 

@@ -20,9 +20,9 @@ def closed_port() -> int:
 
 def test_on_this_machine_the_host_is_told_that_pairing_may_not_be_needed(tmp_path: Path) -> None:
     """A board-agent that listens on loopback alone has no door at which to pair: `run` connects as it is."""
-    call = PairingCall(("127.0.0.1", closed_port()), KeyFolder(tmp_path))
-    with pytest.raises(UnavailableError, match="no pairing is needed") as caught, call._line():
-        pass
+    call = PairingCall(("127.0.0.1", closed_port()), KeyFolder(tmp_path), patience_s=0.1)
+    with pytest.raises(UnavailableError, match="no pairing is needed") as caught:
+        call.ask()
     assert "`phone-host run` connects" in caught.value.remedy
     assert "`sudo board-agent pair`" in caught.value.remedy
 
@@ -30,20 +30,14 @@ def test_on_this_machine_the_host_is_told_that_pairing_may_not_be_needed(tmp_pat
 def test_a_link_at_which_nobody_listens_is_told_with_the_address_that_was_typed(tmp_path: Path) -> None:
     """With nobody at the link itself, its address and its pairing port are named; with a board whose door is closed, the door is."""
     port = closed_port()
-    call = PairingCall(("127.0.0.1", port), KeyFolder(tmp_path), f"tcp://127.0.0.1:{port}")
-    with (
-        pytest.raises(UnavailableError, match=f"nobody listens at tcp://127.0.0.1:{port}, nor at its pairing port"),
-        call._line(),
-    ):
-        pass
+    call = PairingCall(("127.0.0.1", port), KeyFolder(tmp_path), f"tcp://127.0.0.1:{port}", patience_s=0.1)
+    with pytest.raises(UnavailableError, match=f"nobody listens at tcp://127.0.0.1:{port}, nor at its pairing port"):
+        call.ask()
     with socket.create_server(("127.0.0.1", 0)) as board:
         link = f"tcp://127.0.0.1:{board.getsockname()[1]}"
-        call = PairingCall(("127.0.0.1", closed_port()), KeyFolder(tmp_path), link)
-        with (
-            pytest.raises(UnavailableError, match=f"{link} \\(pairing port [0-9]+\\) does not take in a new host"),
-            call._line(),
-        ):
-            pass
+        call = PairingCall(("127.0.0.1", closed_port()), KeyFolder(tmp_path), link, patience_s=0.1)
+        with pytest.raises(UnavailableError, match=f"{link} \\(pairing port [0-9]+\\) does not take in a new host"):
+            call.ask()
 
 
 def test_what_pairing_waits_for_is_said_at_once(tmp_path: Path) -> None:

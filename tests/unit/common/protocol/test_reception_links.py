@@ -43,12 +43,13 @@ class TwoLines:
             self.now_ns += 20 * MS
             self.reception.tick(self.now_ns)
             while self.said:
-                self._reach_board(self.said.pop(0))
+                self.reach_board(self.said.pop(0))
             if self.reception.carrier != carriers[-1]:
                 carriers.append(self.reception.carrier)
         return carriers
 
-    def _reach_board(self, outgoing: Outgoing) -> None:
+    def reach_board(self, outgoing: Outgoing) -> None:
+        """Deliver a message, and the answers to it."""
         name, message = outgoing.connection, outgoing.message
         if isinstance(message, Ping):
             message = replace(message, t0_ns=self.now_ns - self.round_trips_ns[name[0]])
@@ -85,7 +86,7 @@ def test_without_a_board_nobody_is_steered() -> None:
     lines.run(1_000 * MS)
     lines.reception.steer(5 * MS, lines.now_ns)
     [asked] = lines.said
-    lines._reach_board(asked)
+    lines.reach_board(asked)
     assert lines.board.take_steering() == 5 * MS
 
 

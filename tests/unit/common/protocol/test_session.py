@@ -149,10 +149,8 @@ def test_frames_that_come_back_are_never_taken(*, events: list[Event], board_dia
         stale = len(host.stale)
         world.inject(host, frame(session, index))
         assert len(host.stale) == stale + 1
-        stream = host.session._stream
-        assert stream is not None
         # Between a board's waking and its new hello on the lane for frames, its session's frames are of the earlier clock.
-        is_now = session == host.board_session and stream.hello.boot_id == host.boot_id
+        is_now = session == host.board_session and host.accepted_boot_id == host.boot_id
         assert host.stale[-1].reason is (StaleReason.DUPLICATE if is_now else StaleReason.OLD_SESSION)
 
 

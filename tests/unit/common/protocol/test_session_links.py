@@ -100,7 +100,7 @@ def happen(world: World, event: Event) -> None:
         case What.MEND:
             world.mend_link(event.link)
         case What.CARRY:
-            world._host_does(host, host.session.carry(event.link, world.now_ns))
+            world.host_does(host, host.session.carry(event.link, world.now_ns))
         case What.RESTART_BOARD:
             world.restart_board()
         case What.RESTART_HOST:
@@ -159,7 +159,7 @@ def settled(*, board_dials: bool = False) -> World:
     world = World(board_dials=board_dials, links=LINKS)
     world.settle(1000 * MS)
     host = world.hosts[0]
-    world._host_does(host, host.session.carry(0, world.now_ns))
+    world.host_does(host, host.session.carry(0, world.now_ns))
     world.settle(100 * MS)
     assert host.session.carrier == 0
     return world
@@ -178,7 +178,7 @@ def with_second_link_lost() -> World:
 def shoot(world: World) -> None:
     """Give the board credit for one frame, and let it send that frame."""
     host = world.hosts[0]
-    world._host_does(host, host.session.grant(1))
+    world.host_does(host, host.session.grant(1))
     carrier = host.session.carrier
     assert carrier is not None
     while world.deliver(host, (carrier, Lane.CONTROL), to_board=True):
@@ -215,7 +215,7 @@ def test_a_choice_moves_the_stream_at_the_cost_of_one_round_trip(*, board_dials:
     host = world.hosts[0]
     for link in (1, 0, 1):
         before = len(host.arrived)
-        world._host_does(host, host.session.carry(link, world.now_ns))
+        world.host_does(host, host.session.carry(link, world.now_ns))
         world.settle(200 * MS)
         assert host.session.carrier == link
         assert len(host.arrived) >= before + 3
@@ -228,7 +228,7 @@ def test_the_old_links_last_frame_comes_late() -> None:
     host = world.hosts[0]
     shoot(world)
     [late] = [m for m in host.wires[0, Lane.FRAMES].to_host if isinstance(m, FrameMessage)]
-    world._host_does(host, host.session.carry(1, world.now_ns))
+    world.host_does(host, host.session.carry(1, world.now_ns))
     for to_board in (True, False):
         world.deliver(host, (1, Lane.FRAMES), to_board=to_board)
     assert host.session.carrier == 1
@@ -252,7 +252,7 @@ def test_a_half_dead_link_is_given_up() -> None:
     world.cut.add((1, Lane.FRAMES))
     begin_ns = world.now_ns
     before = len(host.arrived)
-    world._host_does(host, host.session.carry(1, world.now_ns))
+    world.host_does(host, host.session.carry(1, world.now_ns))
     while LinkDown(1, stuck=True) not in host.others:
         world.settle(20 * MS)
         assert world.now_ns - begin_ns < STUCK_NS + 300 * MS
@@ -271,7 +271,7 @@ def test_a_link_that_comes_up_later_stands_by() -> None:
     world.mend_link(0)
     world.settle(500 * MS)
     assert host.carriers == [1]
-    world._host_does(host, host.session.carry(0, world.now_ns))
+    world.host_does(host, host.session.carry(0, world.now_ns))
     world.settle(100 * MS)
     assert host.carriers == [1, 0]
 
@@ -284,7 +284,7 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
     control = host.names[1, Lane.CONTROL]
     begin_ns = world.now_ns
     while OtherBoard(1, other) not in host.others:
-        world._host_does(host, host.session.receive(control, other, world.now_ns))
+        world.host_does(host, host.session.receive(control, other, world.now_ns))
         world.settle(200 * MS)
         assert world.now_ns - begin_ns < TAKEOVER_NS + 500 * MS
     foreign = replace(
@@ -293,7 +293,7 @@ def test_another_board_on_the_second_link_is_told_and_left_alone() -> None:
         sent_index=3,
         sequence=3,
     )
-    world._host_does(host, host.session.receive(host.names[1, Lane.FRAMES], foreign, world.now_ns))
+    world.host_does(host, host.session.receive(host.names[1, Lane.FRAMES], foreign, world.now_ns))
     assert host.stale[-1].reason is StaleReason.OLD_SESSION
     assert host.session.receive(control, Bye(BoardCounts(99, 99)), world.now_ns) == []
     before = len(host.arrived)
@@ -348,7 +348,7 @@ def test_a_goodbye_is_said_on_every_link() -> None:
     host = world.hosts[0]
     farewell = host.session.leave()
     assert [o.message for o in farewell if isinstance(o, Outgoing)] == [Bye(), Bye()]
-    world._host_does(host, farewell)
+    world.host_does(host, farewell)
     world.deliver(host, (1, Lane.CONTROL), to_board=True)
     assert not world.board.has_host
     world.deliver_all()
@@ -360,14 +360,14 @@ def test_a_standby_costs_few_words() -> None:
     world = settled()
     world.settle(12_000 * MS)
     said: list[object] = []
-    sends = world._host_sends
+    sends = world.host_sends
 
     def listen(host: HostNode, connection: bytes, message: Message) -> None:
         if connection[0] == 1:
             said.append(message)
         sends(host, connection, message)
 
-    world._host_sends = listen  # type: ignore[method-assign]  # only listens
+    world.host_sends = listen  # type: ignore[method-assign]  # only listens
     world.settle(4000 * MS)
     assert not any(isinstance(message, Credit | HostHello) for message in said)
     assert 9 <= sum(isinstance(message, Ping) for message in said) <= 15

@@ -113,7 +113,7 @@ class Happenings(RuleBasedStateMachine):
     @rule()
     def a_stray_knock(self) -> None:
         """The board says that it does not know the host."""
-        self.world.lie(Knock(Lane.CONTROL, self.world._board.session))
+        self.world.lie(Knock(Lane.CONTROL, self.world.board_session))
 
     @invariant()
     def no_wrong_pair(self) -> None:
@@ -217,7 +217,7 @@ def test_a_wave_that_lies_is_not_confirmed_by_slow_echoes(seed: int) -> None:
     world = SteppingWorld(60 * MS, 4.0, seed)
     world.run(4 * SECOND_NS)
     told_ns, asked_ns = world.board_clock() + 180 * MS, world.host_clock() - MS
-    world.lie(Pong(wave=world.reception._session._paths[0].waves._wave, t0_ns=asked_ns, t1_ns=told_ns, t2_ns=told_ns))
+    world.lie(Pong(wave=world.wave, t0_ns=asked_ns, t1_ns=told_ns, t2_ns=told_ns))
     world.run(4 * SECOND_NS)
     assert world.reception.account.clock_steps == 0
     assert world.witness.wrong == []

@@ -90,7 +90,7 @@ def test_a_goodbye_makes_room_at_once() -> None:
     world.settle(500 * MS)
     assert first.arrived
     assert not second.arrived
-    world._host_does(first, first.session.leave())
+    world.host_does(first, first.session.leave())
     world.deliver_all()
     world.hosts.remove(first)
     world.settle(300 * MS)
@@ -130,9 +130,9 @@ def test_silence_is_not_ones_own_absence(stopped: str) -> None:
     for _ in range(500):
         world.now_ns += 20 * MS
         if awake == "board" and world.now_ns >= board.due_ns:
-            world._board_says(board.tick(world.now_ns, world.counts))
+            world.board_says(board.tick(world.now_ns, world.counts))
         if awake == "host" and world.now_ns >= host.session.due_ns:
-            world._host_does(host, host.session.tick(world.now_ns))
+            world.host_does(host, host.session.tick(world.now_ns))
     assert board.has_host == (stopped != "host")
     assert host.session.is_open == (stopped != "board")
     world.settle(1000 * MS)
@@ -146,7 +146,7 @@ def test_a_board_that_forgot_its_host_voids_what_is_known_of_the_clocks() -> Non
     world = World()
     world.settle(2000 * MS)
     host = world.hosts[0]
-    world.board._host = None
+    world.board.begin_clock(world.boot_id)  # forgets the host; the clock is the same
     before = len(host.others)
     world.settle(500 * MS)
     told = [output for output in host.others[before:] if not isinstance(output, Echo)]
@@ -161,8 +161,8 @@ def test_a_board_without_its_frames_lane_keeps_the_clock() -> None:
     world.settle(2000 * MS)
     host = world.hosts[0]
     before = len(host.arrived)
-    name = world._board_name(host, (0, Lane.FRAMES))
-    world._board_says(world.board.unreachable(name))
+    name = world.board_name(host, (0, Lane.FRAMES))
+    world.board_says(world.board.unreachable(name))
     world.settle(1000 * MS)
     assert not any(isinstance(output, ClockVoid) for output in host.others)
     assert len(host.arrived) > before
@@ -259,7 +259,7 @@ def test_a_board_that_has_said_goodbye_begins_no_new_contact() -> None:
     """A hello that crosses its goodbye is not answered, nor is anything once the host has gone: that contact would only break."""
     world = World()
     world.settle(300 * MS)
-    control = world._board_name(world.hosts[0], (0, Lane.CONTROL))
+    control = world.board_name(world.hosts[0], (0, Lane.CONTROL))
     world.board.leave(world.counts)
     hello = HostHello(host_id="h", lane=Lane.CONTROL)
     assert world.board.receive(control, hello, world.now_ns, world.counts) == []
