@@ -3,7 +3,7 @@
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 from common import now
 from common.errors import DataError, SettingsError
@@ -14,7 +14,6 @@ from phone_host.model import FramePair, Result
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pipeline import Pipeline
 from phone_host.run.sinks import Sink
-from phone_host.stream.pair_queue import PairQueue
 
 _LOG = logging.getLogger(__name__)
 
@@ -22,11 +21,18 @@ _HOPELESS: Final = 10
 """If this many pairs fail before the first success, the cause is not an occasional spoiled frame."""
 
 
+class PairSource(Protocol):
+    """Where pairs come from: live links, two folders of images or a recording, all by way of a PairQueue."""
+
+    def take(self) -> FramePair | None:
+        """Wait for the next pair and return it; None: no further one comes."""
+
+
 class Worker:
     """The worker thread.
 
     Args:
-        queue: source of the pairs.
+        source: of the pairs.
         pipeline: computes their depth.
         ledgerer: keeps the books.
         sinks: take the results.
@@ -36,7 +42,7 @@ class Worker:
 
     def __init__(
         self,
-        queue: PairQueue,
+        source: PairSource,
         pipeline: Pipeline,
         ledgerer: Ledgerer,
         sinks: Sequence[Sink],
@@ -44,7 +50,7 @@ class Worker:
         most_pairs: int,
         taken: Callable[[], None],
     ) -> None:
-        self._queue, self._pipeline, self._ledgerer, self._sinks = queue, pipeline, ledgerer, tuple(sinks)
+        self._source, self._pipeline, self._ledgerer, self._sinks = source, pipeline, ledgerer, tuple(sinks)
         self._most_pairs, self._taken = most_pairs, taken
         self._thread = threading.Thread(target=self._work, name="worker", daemon=True)
         self.finished = threading.Event()
@@ -57,7 +63,7 @@ class Worker:
         self._thread.start()
 
     def stop(self, patience_s: float | None = None) -> None:
-        """Finish the current pair, start none of the waiting ones, and end. The queue must be closed.
+        """Finish the current pair, start none of the waiting ones, and end. The source must be closed.
 
         Args:
             patience_s: give up a pair that takes longer than this; None: wait for it.
@@ -76,7 +82,7 @@ class Worker:
     def _work(self) -> None:
         try:
             # Whoever is given up has nobody left to tell: what he would wake is closed by now.
-            while not self.has_given_up and (pair := self._queue.take()) is not None:
+            while not self.has_given_up and (pair := self._source.take()) is not None:
                 dequeued_ns = now.monotonic_ns()
                 self._taken()
                 if not self.finished.is_set():
