@@ -121,10 +121,6 @@ def test_a_file_takes_the_gcode(gcode: Path, tmp_path: Path) -> None:
     assert out.read_bytes() == gcode.read_bytes()
     assert done(tmp_path, str(gcode), "--printer", f"file:{out}").returncode == 2
     assert "is no folder" in done(tmp_path, str(gcode), "--printer", f"file:{tmp_path}/no/x.gcode").stderr
-    hot = tmp_path / "hot.gcode"
-    hot.write_text("\n".join(cube(50)[:-3]) + "\n")
-    told = done(tmp_path, str(hot), "--printer", f"file:{tmp_path}/hot-out.gcode")
-    assert "note: its G-code leaves heaters on" in told.stdout
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")

@@ -72,40 +72,6 @@ def test_a_print_that_ends_between_two_questions_is_done(kind: ServerKind, job: 
 
 
 @KINDS
-def test_cancelling_leaves_the_heaters_off(kind: ServerKind, job: Job) -> None:
-    """The print is ended, and the server was asked whether the heaters are off."""
-    wishes = Wishes()
-
-    def watch(progress: Progress) -> None:
-        if progress.phase is Phase.PRINTING:
-            wishes.cancel()
-
-    with print_server(kind, ServerFaults(rate=0.01)) as there:
-        ended = printed(there, job, wishes=wishes, tell=watch)
-    assert ended.phase is Phase.CANCELLED
-    assert there.condition == "cancelled"
-    assert there.goal == 0.0
-    assert there.share < 1.0, "it was not printed to its end"
-
-
-@KINDS
-def test_a_pause_is_passed_on(kind: ServerKind, job: Job) -> None:
-    """And goes on after it, to the end."""
-    wishes, phases = Wishes(), list[Phase]()
-
-    def watch(progress: Progress) -> None:
-        if progress.phase is Phase.PRINTING and Phase.PAUSED not in phases:
-            wishes.pause()
-        elif progress.phase is Phase.PAUSED:
-            wishes.go_on()
-        phases.append(progress.phase)
-
-    with print_server(kind, ServerFaults(rate=0.5)) as there:
-        ended = printed(there, job, wishes=wishes, tell=watch)
-    assert (ended.phase, there.paused) == (Phase.DONE, 1)
-
-
-@KINDS
 @pytest.mark.parametrize(
     ("faults", "words"),
     [
@@ -249,18 +215,6 @@ def test_prusalink_that_does_not_cool_is_told(job: Job) -> None:
 
         with pytest.raises(PrinterGoneError, match="does not say that the print has ended"):
             printed(there, job, wishes=wishes, tell=watch, patience=CURT)
-
-
-def test_a_file_that_leaves_heaters_on_is_cooled_or_told(tmp_path: Path) -> None:
-    """OctoPrint and Moonraker switch them off after the print; PrusaLink cannot, and that is said."""
-    hot = tmp_path / "hot.gcode"
-    hot.write_text("\n".join(cube(100)[:-3]) + "\n")
-    for kind in ServerKind:
-        with print_server(kind) as there:
-            ended = printed(there, Job(hot, hot.name, facts_of(hot)))
-            assert ended.phase is Phase.DONE
-            assert len(ended.notes) == 1
-            assert (there.cooled_s > 0) == ("were switched off" in ended.notes[0]) == (kind is not ServerKind.PRUSALINK)
 
 
 def test_a_print_runs_in_a_thread_of_its_own(job: Job) -> None:
