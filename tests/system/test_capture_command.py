@@ -43,19 +43,37 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def doctor(film: Path, *arguments: str) -> tuple[dict[str, Any], str]:
-    """Run the doctor with the film; return its JSON and what it told on the way. The user's data lie beside the film."""
+def _started(film: Path, *arguments: str) -> "subprocess.Popen[str]":
+    """Start the doctor with the film. The user's data lie beside the film."""
     camera = f"replay:{film}/film?fps={_FPS}&loop=1&pace=clock"
     command = [sys.executable, "-P", "-m", "phone_host.cli", "doctor", "--json", "--camera", camera, *arguments]
     own = {**os.environ, "XDG_DATA_HOME": str(film / "data")}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, env=own)
-    assert "Traceback" not in done.stderr
-    return json.loads(done.stdout) if done.stdout else {}, done.stderr
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=own)
 
 
-def test_a_film_is_checked_and_kept_beside_the_rig(film: Path) -> None:
+def _ended(process: "subprocess.Popen[str]") -> tuple[dict[str, Any], str]:
+    """Return its JSON and what it told on the way."""
+    with process:
+        found, told = process.communicate(timeout=300)
+    assert "Traceback" not in told
+    return json.loads(found) if found else {}, told
+
+
+def doctor(film: Path, *arguments: str) -> tuple[dict[str, Any], str]:
+    """Run the doctor with the film; return its JSON and what it told on the way."""
+    return _ended(_started(film, *arguments))
+
+
+@pytest.fixture(scope="module")
+def captures(film: Path) -> list[tuple[dict[str, Any], str]]:
+    """Two checks of ten seconds, side by side: with the calibration, and before there is one."""
+    begun = [_started(film, *words, "--capture", "10") for words in (("--calibration", str(film / "rig.yaml")), ())]
+    return [_ended(process) for process in begun]
+
+
+def test_a_film_is_checked_and_kept_beside_the_rig(film: Path, captures: list[tuple[dict[str, Any], str]]) -> None:
     """The user is led through it; an ideal camera's film is rigid, with no rolling shutter; the next doctor knows."""
-    found, told = doctor(film, "--calibration", str(film / "rig.yaml"), "--capture", "10")
+    found, told = captures[0]
     checks = {check["what"]: check for check in found["checks"]}
     assert checks["stabilisation"]["verdict"] == "ok", found["capture"]
     assert "global" in checks["shutter"]["finding"]
@@ -68,9 +86,11 @@ def test_a_film_is_checked_and_kept_beside_the_rig(film: Path) -> None:
     assert kept.startswith("checked: none seen")
 
 
-def test_a_film_is_checked_before_the_calibration_and_kept_among_the_users_data(film: Path, tmp_path: Path) -> None:
+def test_a_film_is_checked_before_the_calibration_and_kept_among_the_users_data(
+    film: Path, captures: list[tuple[dict[str, Any], str]], tmp_path: Path
+) -> None:
     """Without a calibration the next doctor knows of the check, too; with one that has none beside it, another is asked for."""
-    found, _ = doctor(film, "--capture", "10")
+    found, _ = captures[1]
     kept = film / "data" / "tandemscan" / "capture.json"
     assert found["capture"] == json.loads(kept.read_text(encoding="utf-8"))
     assert found["capture"]["rigidity"]["knows_lens"] is False

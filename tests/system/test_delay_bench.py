@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,14 @@ SHORT = ["--links", "ipc", "--size", "160x120", "--fps", "15", "--seconds", "2"]
 
 def bench(arguments: list[str], folder: Path) -> Any:
     return program("phone_host.bench.cli", arguments, folder, "bench")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def absent(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Program]]:
+    """An address at which no board is, and a benchmark that waits for one: a quarter of a minute, in which the other tests run."""
+    address = f"tcp://127.0.0.1:{free_port()}"
+    with bench(["--links", f"ipc,{address}", *SHORT[2:]], tmp_path_factory.mktemp("absent")) as running:
+        yield address, running
 
 
 def boards_of(running: Program) -> list[int]:
@@ -143,14 +152,6 @@ def test_a_board_elsewhere_is_measured_with_its_own_camera(tmp_path: Path) -> No
     assert (run["link"], run["camera_rate_hz"], run["jpeg_quality_percent"]) == (address, 20, None)
     assert run["measured_pairs"] > 0
     assert "not set from here" in running.stderr
-
-
-def test_an_absent_board_elsewhere_is_exit_3(tmp_path: Path) -> None:
-    """A missing board is reported before anything is measured."""
-    address = f"tcp://127.0.0.1:{free_port()}"
-    with bench(["--links", f"ipc,{address}", *SHORT[2:]], tmp_path) as running:
-        assert running.wait() == 3
-    assert address in running.stderr.splitlines()[-1]
 
 
 def test_profiles_are_listed() -> None:
@@ -287,3 +288,10 @@ def test_help_opens_with_examples() -> None:
         [sys.executable, "-m", "phone_host.bench.cli", "--help"], capture_output=True, text=True, check=True
     )
     assert re.match(r"examples:\n  \S*delay-bench --out bench\n", done.stdout)
+
+
+def test_an_absent_board_elsewhere_is_exit_3(absent: tuple[str, Program]) -> None:
+    """A missing board is reported before anything is measured."""
+    address, running = absent
+    assert running.wait() == 3
+    assert address in running.stderr.splitlines()[-1]
