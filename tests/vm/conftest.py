@@ -1,5 +1,7 @@
 """The board that each file of tests gets: of its own, and as a snapshot left it. `make test-board` builds its image; without it the tests are skipped."""
 
+import fcntl
+import os
 import shutil
 import subprocess
 import tempfile
@@ -73,12 +75,37 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> Film:
 
 
 @pytest.fixture(scope="session")
-def snapshot(package: Path) -> Iterator[Snapshot]:
-    """The board with its package installed, its camera configured, and its link open to everybody."""
-    with booted(Architecture.AMD64, savable=True) as guest:
-        guest.install(package)
-        guest.configure(CAMERA)
-        yield guest.save()
+def snapshot(package: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Snapshot]:
+    """The board with its package installed, its camera configured, and its link open to everybody.
+
+    One boot serves all workers: the first that needs it makes it, and the last that has it removes it.
+    """
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "snapshot"
+    made, mine = Snapshot(image_of(Architecture.AMD64), folder / "disk", folder / "memory"), folder / str(os.getpid())
+    with _alone(folder):
+        if not made.memory.exists():
+            with booted(Architecture.AMD64, savable=True) as guest:
+                guest.install(package)
+                guest.configure(CAMERA)
+                saved = guest.save()
+                folder.mkdir(exist_ok=True)
+                shutil.move(saved.disk, made.disk)
+                shutil.move(saved.memory, made.memory)
+        mine.touch()
+    yield made
+    with _alone(folder):
+        mine.unlink()
+        if {path.name for path in folder.iterdir()} == {"disk", "memory"}:
+            shutil.rmtree(folder)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep other workers from a folder for the length of a block."""
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 @pytest.fixture(scope="module")
