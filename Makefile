@@ -12,6 +12,11 @@ PARTS := unit cases scan contract native system hostile print web
 SIGNALS := tests/print/test_signals.py tests/print/test_lying_printers.py tests/print/test_strange_firmware.py tests/system/test_signals_of_verbs.py
 # What the native library is made of; .ci/venv knows the same.
 NATIVE := setup.py phone_host/native/build_library.py $(wildcard phone_host/native/src/*)
+# What is right or wrong without a rendered image, a process or a camera: protocol, clocks and pairing, queues, the stereo core's geometry, formats.
+CORE := $(patsubst %,tests/unit/%,common/protocol sync stream common/imagesize) $(patsubst %,tests/unit/common/test_%.py,frame ledger stamp) \
+	$(patsubst %,tests/unit/common/recording/test_%.py,cdr image_layouts recording_bytes) \
+	$(patsubst %,tests/unit/stereo/test_%.py,depth_limits filters raw_images rectify reproject) \
+	$(patsubst %,tests/unit/output/test_%.py,json_text pfm ply rig_yaml yaml_text)
 BENCHES := $(patsubst tests/bench/%.py,%,$(sort $(wildcard tests/bench/bench_*.py)))
 
 ifndef SCAN_DATA
@@ -21,7 +26,7 @@ endif
 endif
 
 .DEFAULT_GOAL := help
-.PHONY: help run-venv venv demo native vendor vendor-check docs docs-run figures test test-slow test-fresh coverage soak attack $(PARTS:%=test-%) test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
+.PHONY: help run-venv venv demo native vendor vendor-check docs docs-run figures test test-slow test-fresh coverage soak attack $(PARTS:%=test-%) test-core test-arm test-board walk deb lint types bench fuzz oracles printers lock clean
 
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -47,6 +52,9 @@ test: $(READY) ## run the unit, cases, scan, contract, native, system, hostile, 
 
 $(PARTS:%=test-%): test-%: $(READY) # run one part: make test-unit
 	@.ci/test $*
+
+test-core: $(READY) ## run the tests of protocol, clocks, pairing, queues, stereo geometry and formats: ten seconds, for every day (PYTEST_FLAGS="-k clock")
+	@$(BIN)/python -m pytest -q -m "not slow and not long and not many" $(PYTEST_FLAGS) $(CORE)
 
 test-slow: $(READY) ## run the tests with large samples, too slow for every day, and the properties with new random examples; the other tests use small, equal ones
 	@$(BIN)/python -m pytest -q -n 2 -m "slow or hypothesis" --hypothesis-profile=exploring tests/unit tests/scan tests/contract tests/print

@@ -32,6 +32,7 @@ FACTS = st.lists(
 )
 
 
+@pytest.mark.many
 @given(FACTS, st.floats(-MAX_SKEW, MAX_SKEW))
 @settings(deadline=None, max_examples=150)
 def test_the_strip_is_that_of_all_facts(facts: list[tuple[int, int, int]], skew: float) -> None:
@@ -98,6 +99,7 @@ def test_the_bound_contains_the_truth_on_any_link(profile: Profile) -> None:
                 assert moment.uncertainty_ns <= moment.bound_ns
 
 
+@pytest.mark.many
 @given(
     st.integers(0, 2**32),
     st.integers(-(2**50), 2**50),

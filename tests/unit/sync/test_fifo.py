@@ -10,6 +10,7 @@ from phone_host.sync.fifo import Fifo, FifoSettings, Overflow
 PUT, TAKE = True, False
 
 
+@pytest.mark.many
 @given(st.integers(1, 5), st.sampled_from(Overflow), st.lists(st.sampled_from([PUT, TAKE]), max_size=80))
 @settings(deadline=None, max_examples=200)
 def test_order_bound_policy_and_conservation(depth: int, overflow: Overflow, acts: list[bool]) -> None:

@@ -64,6 +64,7 @@ def sparse_streams(draw: st.DrawFn) -> tuple[int, list[int], list[int], list[tup
     return tolerance_ns, board, host, draw(merged(board, host))
 
 
+@pytest.mark.many
 @given(
     st.integers(0, 60),
     st.integers(1, 50),
@@ -252,6 +253,7 @@ def test_dense_streams_lose_hardly_a_pair_and_wait_a_period_at_most(
     assert longest_ns <= PERIOD_NS + MS
 
 
+@pytest.mark.many
 @given(st.floats(0.1, 0.48), st.floats(0, 1), st.sampled_from([0.0, 0.1]), st.integers(0, 2**32))
 @settings(deadline=None, max_examples=50)
 def test_no_pair_is_one_that_the_optimum_forbids(tolerance: float, phase: float, loss: float, seed: int) -> None:

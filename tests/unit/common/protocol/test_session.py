@@ -96,6 +96,7 @@ def chaos(events: list[Event], *, board_dials: bool, slots: int = 1, settled: bo
     return world
 
 
+@pytest.mark.many
 @given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4), settled=st.booleans())
 @settings(deadline=None, max_examples=150)
 def test_frames_flow_again_and_every_one_is_accounted_for(
@@ -139,6 +140,7 @@ def test_a_board_that_has_slept_is_greeted_anew(*, board_dials: bool) -> None:
     assert world.sent[session] == host.base_sent + host.received + host.lost
 
 
+@pytest.mark.many
 @given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4))
 @settings(deadline=None, max_examples=100)
 def test_frames_that_come_back_are_never_taken(*, events: list[Event], board_dials: bool, slots: int) -> None:

@@ -112,6 +112,7 @@ def happen(world: World, event: Event) -> None:
 any_course = given(events=EVENTS, board_dials=st.booleans(), slots=st.integers(1, 4), alive=st.integers(0, LINKS))
 
 
+@pytest.mark.many
 @pytest.mark.long
 @any_course
 @settings(deadline=None, max_examples=50)

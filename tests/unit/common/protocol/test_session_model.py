@@ -11,6 +11,8 @@ from phone_host.sync.quarantine import Disbelief
 from tests.support.stepping_world import Machine, SteppingWorld
 from tests.support.witness import PERIOD_NS
 
+pytestmark = pytest.mark.many
+
 SECOND_NS = 1000 * MS
 FAR_NS = st.one_of(
     st.integers(2 * PERIOD_NS, SECOND_NS), st.sampled_from([2 * SECOND_NS, 7 * SECOND_NS, 13 * SECOND_NS])
