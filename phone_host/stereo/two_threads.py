@@ -7,7 +7,7 @@ from typing import Final, TypeVar
 A = TypeVar("A")
 B = TypeVar("B")
 
-_HELPERS: Final = ThreadPoolExecutor(4, thread_name_prefix="second-of-two")
+HELPERS: Final = ThreadPoolExecutor(4, thread_name_prefix="second-of-two")
 """Threads that are kept: to start one costs 0.25 ms of processor time on a small machine, to wake one 0.05 ms. They start when they are needed,
 and more than one only where several threads need one at a time."""
 
@@ -29,7 +29,7 @@ def in_two_threads(first: Callable[[], A], second: Callable[[], B]) -> tuple[A, 
         Exception: whatever one of the two raises; the first's, if both do.
     """
     try:
-        helped: Future[B] = _HELPERS.submit(second)
+        helped: Future[B] = HELPERS.submit(second)
     except RuntimeError:  # the program is about to end, or this system lets it have no more threads
         return first(), second()
     try:

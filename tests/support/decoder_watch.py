@@ -24,7 +24,7 @@ def watched_decoder(on_decoding: Callable[[], None]) -> Iterator[None]:
     before, before_in_threads = sys.getprofile(), threading.getprofile()
     # Threads that are kept from earlier decodings would not be seen: others take their place meanwhile.
     with ThreadPoolExecutor(2) as helpers, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(two_threads, "_HELPERS", helpers)
+        patch.setattr(two_threads, "HELPERS", helpers)
         sys.setprofile(watch)
         threading.setprofile(watch)
         try:
