@@ -45,6 +45,7 @@ def sides() -> st.SearchStrategy[tuple[int, ...]]:
     return st.sets(st.integers(0, 300), min_size=2, max_size=40).map(lambda numbers: tuple(sorted(numbers)))
 
 
+@pytest.mark.many
 @given(sides(), sides())
 def test_each_image_meets_the_one_of_its_number_and_every_other_is_counted(
     own: tuple[int, ...], board: tuple[int, ...]
@@ -106,6 +107,7 @@ def test_images_named_by_times_are_paired_by_them(tmp_path: Path) -> None:
             assert [item.number for item in found if item.index is None] == [n for n in board[first:] if n not in own]
 
 
+@pytest.mark.many
 @given(TIMES, TIMES, st.data())
 def test_times_anywhere_in_63_bits_meet_their_own(
     numbers: tuple[int, ...], others: tuple[int, ...], data: st.DataObject

@@ -185,6 +185,7 @@ def test_bytes_before_a_marker_are_passed_over() -> None:
         np.testing.assert_array_equal(decode(sloppy), decode(content))
 
 
+@pytest.mark.many
 @given(
     st.sampled_from([b"", b"\xff\xd8", b"\x89PNG\r\n\x1a\n", b"BM", b"II*\0", b"MM\0+", b"RIFF1234WEBPVP8", b"P6 1 "]),
     st.binary(max_size=300),
@@ -200,6 +201,7 @@ def test_any_bytes_are_read_or_refused(start: bytes, rest: bytes) -> None:
     assert min(head.size_px) >= 1
 
 
+@pytest.mark.many
 @given(st.sampled_from(sorted(KINDS)), st.data())
 @settings(deadline=None, max_examples=300)
 def test_what_is_decoded_has_the_size_that_was_read(suffix: str, data: st.DataObject) -> None:

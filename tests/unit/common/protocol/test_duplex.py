@@ -231,6 +231,7 @@ def test_a_lost_chunk_costs_one_frame() -> None:
     assert made.ends[HOST].counts.broken == 1
 
 
+@pytest.mark.many
 def test_acknowledgements_that_all_get_lost_do_not_stop_the_stream() -> None:
     """While the way back is dead little is written; once it works again fresh frames are back within a second."""
     made = line(500_000, MS)

@@ -135,6 +135,7 @@ def test_the_own_echo_is_garbage() -> None:
     assert deframer.garbage_bytes == len(wire(unit))
 
 
+@pytest.mark.many
 def test_ten_million_random_bytes_are_no_unit() -> None:
     """Among 10^7 random bytes no unit is found, memory stays below two megabytes, and the good unit behind them is found."""
     chance = random.Random(1)
@@ -151,6 +152,7 @@ def test_ten_million_random_bytes_are_no_unit() -> None:
     assert deframer.garbage_bytes == 160 * 62_500
 
 
+@pytest.mark.many
 def test_hostile_headers_cost_no_memory() -> None:
     """Headers with valid checks and the greatest length, back to back, hold no more than one unit's bytes."""
     start = MARKER + (0x0FFF).to_bytes(2, "little") + b"\0\0"

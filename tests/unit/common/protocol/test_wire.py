@@ -68,6 +68,7 @@ def test_round_trip(message: Message) -> None:
         assert payload is message.payload
 
 
+@pytest.mark.many
 @given(MESSAGES, st.integers(0, 2**32))
 @settings(deadline=None, max_examples=150)
 def test_mutated_headers_raise_nothing_but_protocol_errors(message: Message, seed: int) -> None:
@@ -95,6 +96,7 @@ def test_random_bytes_raise_nothing_but_protocol_errors(header: bytes) -> None:
     is_refused_or_read(header)
 
 
+@pytest.mark.many
 @given(
     st.recursive(
         st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats() | st.text(max_size=9) | st.binary(),
