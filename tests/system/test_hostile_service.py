@@ -2,11 +2,9 @@
 
 import os
 import shutil
-import signal
 import socket
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgpack
@@ -14,10 +12,9 @@ import pytest
 import zmq
 
 from tests.support.enrolment_rig import ports
+from tests.support.nobody import NOBODY, nobody
 from tests.support.numbered import write_film
 from tests.support.programs import host, program, until
-
-NOBODY = 65534
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="only root can act for another user")
 
@@ -32,25 +29,6 @@ def folder() -> Iterator[Path]:
     os.chown(folder, NOBODY, NOBODY)
     yield folder
     shutil.rmtree(place)
-
-
-@contextmanager
-def service(what: Callable[[], None]) -> Iterator[None]:
-    """The compromised service, for the length of a block."""
-    child = os.fork()
-    if not child:
-        try:
-            os.setgroups([])
-            os.setresgid(NOBODY, NOBODY, NOBODY)
-            os.setresuid(NOBODY, NOBODY, NOBODY)
-            what()
-        finally:
-            os._exit(1)
-    try:
-        yield
-    finally:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
 
 
 def test_root_gives_up_its_rights_before_it_asks_the_service(folder: Path, tmp_path: Path) -> None:
@@ -71,7 +49,7 @@ def test_root_gives_up_its_rights_before_it_asks_the_service(folder: Path, tmp_p
             for word in said:
                 sock.send_multipart([connection, word])
 
-    with service(answer), program("board_agent.cli", ["pair", "--keys", str(folder)], tmp_path, "pair") as owner:
+    with nobody(answer), program("board_agent.cli", ["pair", "--keys", str(folder)], tmp_path, "pair") as owner:
         until(lambda: "654321" in owner.out.read_text() or owner.process.poll() is not None, "the state is shown")
         status = Path(f"/proc/{owner.process.pid}/status").read_text()
         ids = {line.partition(":")[0]: line.split()[1:] for line in status.splitlines()}

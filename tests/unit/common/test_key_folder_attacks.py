@@ -20,9 +20,9 @@ from common.errors import DataError, TandemError, UnavailableError
 from common.files import opened_folder, replacing_in
 from common.keys import KeyFolder
 from common.peers import Peer
+from tests.support.nobody import NOBODY, as_nobody, nobody
 
 ROOT = Path(__file__).resolve().parents[3]
-NOBODY = 65534
 WHEN = "2026-01-01T00:00:00+0000"
 SECRET = "what only root may know"
 
@@ -47,21 +47,6 @@ def folder(place: Path) -> Path:
     folder.mkdir(mode=0o700)
     os.chown(folder, NOBODY, NOBODY)
     return folder
-
-
-def as_nobody(what: Callable[[], None]) -> None:
-    """Do something as the compromised service."""
-    child = os.fork()
-    if not child:
-        try:
-            os.setgroups([])
-            os.setresgid(NOBODY, NOBODY, NOBODY)
-            os.setresuid(NOBODY, NOBODY, NOBODY)
-            what()
-        except BaseException:  # noqa: BLE001 - the parent must not be run twice
-            os._exit(1)
-        os._exit(0)
-    assert os.waitpid(child, 0)[1] == 0
 
 
 def keys_command(folder: Path, *options: str) -> "subprocess.CompletedProcess[str]":
@@ -229,28 +214,20 @@ def test_a_race_for_the_folder_gives_the_service_nothing(place: Path, folder: Pa
     (place / "roots").mkdir(mode=0o755)
     real, keys = folder / "real", folder / "keys"
     as_nobody(lambda: real.mkdir(mode=0o700))
-    child = os.fork()
-    if not child:
-        try:
-            os.setgroups([])
-            os.setresgid(NOBODY, NOBODY, NOBODY)
-            os.setresuid(NOBODY, NOBODY, NOBODY)
-            while True:
-                for target in (real, place / "roots"):
-                    (folder / "next").symlink_to(target)
-                    (folder / "next").rename(keys)
-                    (real / "next").symlink_to(place / "secret")
-                    (real / "next").rename(real / "key")
-        finally:
-            os._exit(1)
-    try:
+
+    def exchange() -> None:
+        while True:
+            for target in (real, place / "roots"):
+                (folder / "next").symlink_to(target)
+                (folder / "next").rename(keys)
+                (real / "next").symlink_to(place / "secret")
+                (real / "next").rename(real / "key")
+
+    with nobody(exchange):
         for _ in range(300):
             with suppress(TandemError):
                 KeyFolder(keys).renew()
                 KeyFolder(keys).own()
-    finally:
-        os.kill(child, 9)
-        os.waitpid(child, 0)
     assert is_as_it_was(place / "secret")
     assert not list((place / "roots").iterdir())
     assert all(path.lstat().st_uid == NOBODY for path in real.iterdir())

@@ -8,7 +8,7 @@ import stat
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -23,8 +23,8 @@ from common.link.base import Incoming, Link
 from common.link.factory import open_link, parse_link
 from common.link.ipc_folder import runtime_folder
 from common.link.waiter import Waiter
+from tests.support.nobody import NOBODY, nobody
 
-NOBODY = 65534
 PATIENCE_S = 30.0
 
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can play two users")
@@ -37,29 +37,6 @@ def shared() -> Iterator[Path]:
     folder.chmod(0o1777)
     yield folder
     shutil.rmtree(folder)
-
-
-@contextmanager
-def as_nobody(what: Callable[[], None], sign: Path) -> Iterator[None]:
-    """Another user's process for the length of a block, once it has shown that it runs."""
-    child = os.fork()
-    if not child:
-        try:
-            os.setgroups([])
-            os.setresgid(NOBODY, NOBODY, NOBODY)
-            os.setresuid(NOBODY, NOBODY, NOBODY)
-            what()
-        finally:
-            os._exit(1)
-    try:
-        deadline = time.monotonic() + PATIENCE_S
-        while not sign.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        yield
-    finally:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
 
 
 def listen(uri: str) -> Link:
@@ -113,7 +90,7 @@ def refused_word(link: Link) -> UnavailableError:
 def test_a_socket_of_another_user_is_not_dialled(shared: Path) -> None:
     """Another user's socket in /tmp is refused at once, in a line that names path, owner and both remedies; `owner=` allows it."""
     path = shared / "board"
-    with as_nobody(lambda: false_board(path), path):
+    with nobody(lambda: false_board(path), path):
         with pytest.raises(UnavailableError, match=f"ipc://{path} .*nobody.*XDG_RUNTIME_DIR.*owner=nobody") as caught:
             dial(f"ipc://{path}")
         assert "\n" not in str(caught.value)
@@ -125,9 +102,9 @@ def test_a_socket_of_another_user_is_not_dialled(shared: Path) -> None:
 def test_a_stranger_who_comes_later_is_not_believed(shared: Path) -> None:
     """If another user takes a free path after a host has begun to wait for its board, his process gives him away: none of his packets gets through."""
     path = shared / "board"
-    with closing(dial(f"ipc://{path}")) as link, as_nobody(lambda: false_board(path), path):
+    with closing(dial(f"ipc://{path}")) as link, nobody(lambda: false_board(path), path):
         assert "a process of user nobody listens there" in str(refused_word(link))
-    with closing(dial(f"ipc://{path}2?owner=nobody")) as link, as_nobody(lambda: false_board(Path(f"{path}2")), path):
+    with closing(dial(f"ipc://{path}2?owner=nobody")) as link, nobody(lambda: false_board(Path(f"{path}2")), path):
         deadline = time.monotonic() + PATIENCE_S
         while not (packets := list(link.receive())) and time.monotonic() < deadline:
             for connection in link.dialled.values():
@@ -174,7 +151,7 @@ def test_a_listener_that_accepts_nobody_holds_up_nobody(shared: Path) -> None:
     """Another user's socket with a full queue is reported at once as taken, with the user's name."""
     path = shared / "board"
     with (
-        as_nobody(lambda: silent_listener(path), shared / "full"),
+        nobody(lambda: silent_listener(path), shared / "full"),
         pytest.raises(TakenError, match="taken by user nobody"),
     ):
         listen(f"ipc://{path}")
