@@ -1,6 +1,5 @@
 """What holds of every source of a run's pairs: they come once and in order, every frame is accounted for, and the run ends when the source or the user does."""
 
-import socket
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
@@ -8,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from board_agent.agent import Agent
 from common import now
 from common.camera.factory import open_camera
 from common.link.factory import open_link, parse_link
@@ -19,6 +17,7 @@ from phone_host.recording.playback import Playback
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.sinks import FunctionSink, Sink
+from tests.support.board_thread import board_of
 from tests.support.numbered import write_film
 from tests.support.recorded import recording_file
 
@@ -27,25 +26,6 @@ MISSING = frozenset({3, 7})
 """Left images that are not in the recording."""
 
 SOURCES = ("link", "folders", "recording at its pace", "recording at ours")
-
-
-@contextmanager
-def _board(film: Path, address: str, options: str) -> Iterator[None]:
-    """A board that shows a film at a link."""
-    reader, writer = socket.socketpair()
-    with (
-        reader,
-        writer,
-        closing(open_camera(f"replay:{film}?{options}", "board", now.monotonic_ns())) as camera,
-        closing(open_link(parse_link(address, listens_by_default=True))) as link,
-    ):
-        thread = threading.Thread(target=Agent(camera, [link], now.random_id(), "boot", reader).run)
-        thread.start()
-        try:
-            yield
-        finally:
-            writer.send(b"\0")
-            thread.join()
 
 
 @contextmanager
@@ -59,7 +39,7 @@ def host_of(source: str, folder: Path, sink: Sink, pairs: int = PAIRS) -> Iterat
             return
         options = "pace=demand" if source == "folders" else "fps=20&loop=1"
         film, address = write_film(folder / "film", PAIRS), f"ipc://{folder}/board"
-        opened.enter_context(_board(film, address, options))
+        opened.enter_context(board_of(open_camera(f"replay:{film}?{options}", "board", now.monotonic_ns()), address))
         camera = opened.enter_context(closing(open_camera(f"replay:{film}?{options}", HOST_CLOCK, now.monotonic_ns())))
         link = open_link(parse_link(address, listens_by_default=False))  # the host closes it
         yield Host(settings, camera, [link], None, [sink])
@@ -83,7 +63,7 @@ def test_pairs_come_once_and_in_order_and_every_frame_is_accounted_for(source: s
         assert {left for left, _ in seen} <= set(range(PAIRS)) - MISSING
         assert all(left == right for left, right in seen)
     elif source != "link":
-        missing = set() if source == "folders" else MISSING
+        missing: frozenset[int] = frozenset() if source == "folders" else MISSING
         assert seen == [(number, number) for number in range(PAIRS) if number not in missing]
     assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
     assert counts.host_frames == counts.paired + sum(n for _, n in counts.host_orphans) + counts.held_host

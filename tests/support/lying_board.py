@@ -1,20 +1,15 @@
 """A board whose camera shows a film with every other image replaced by something else, and whose headers may say anything."""
 
 import itertools
-import socket
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from board_agent.agent import Agent
 from common import now
-from common.camera.base import Camera, Grab
+from common.camera.base import Grab
 from common.camera.replay import ReplayCamera, ReplaySettings
 from common.frame import Frame, PixelFormat
-from common.link.factory import open_link, parse_link
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,20 +55,3 @@ class LyingCamera(ReplayCamera):
         lie = next(self._lies)
         width_px, height_px = lie.size_px or (grab.width_px, grab.height_px)
         return replace(grab, payload=lie.payload, width_px=width_px, height_px=height_px, pixel_format=lie.pixel_format)
-
-
-@contextmanager
-def board_of(camera: Camera, uri: str) -> Iterator[Agent]:
-    """A board with that camera, in a thread."""
-    link = open_link(parse_link(uri, listens_by_default=True))
-    reader, writer = socket.socketpair()
-    with reader, writer:
-        agent = Agent(camera, [link], now.random_id(), now.boot_id(), reader)
-        thread = threading.Thread(target=agent.run)
-        thread.start()
-        try:
-            yield agent
-        finally:
-            writer.send(b"\0")
-            thread.join()
-            link.close()

@@ -31,23 +31,18 @@ def complaint(running: Program) -> str:
     return said[0]
 
 
+def _receiving(film: Path, link: str, out: Path) -> list[str]:
+    """A run that saves every pair of a board and a looped film."""
+    camera = ["--camera", f"replay:{film}?fps=20&loop=1"]
+    return ["run", *camera, "--link", link, "--out", str(out), "--save-every", "1", "--json"]
+
+
 def test_spoiled_jpegs_are_dropped_on_the_board_and_counted_with_their_reason(tmp_path: Path) -> None:
     """Of 40 images every fourth is truncated: 30 are sent and paired, 10 are counted as spoiled, no pair mixes two moments."""
     left = write_film(tmp_path / "left", 40, spoil_every=4)
     right = write_film(tmp_path / "right", 40)
     link, out = f"ipc://{tmp_path}/link", tmp_path / "out"
-    receiving = [
-        "run",
-        "--camera",
-        f"replay:{right}?fps=20&loop=1",
-        "--link",
-        link,
-        "--out",
-        str(out),
-        "--save-every",
-        "1",
-        "--json",
-    ]
+    receiving = _receiving(right, link, out)
     with board(["run", "--camera", f"replay:{left}?fps=20&loop=1", "--link", link, "--json"], tmp_path) as sender:
         with host([*receiving, "--fifo", "8", "--pairs", "60"], tmp_path) as receiver:
             assert receiver.wait() == 0
@@ -66,18 +61,7 @@ def test_images_spoiled_on_the_host_cost_only_their_own_pairs(tmp_path: Path) ->
     left = write_film(tmp_path / "left", 40)
     right = write_film(tmp_path / "right", 40, spoil_every=4)
     link, out = f"ipc://{tmp_path}/link", tmp_path / "out"
-    receiving = [
-        "run",
-        "--camera",
-        f"replay:{right}?fps=20&loop=1",
-        "--link",
-        link,
-        "--out",
-        str(out),
-        "--save-every",
-        "1",
-        "--json",
-    ]
+    receiving = _receiving(right, link, out)
     sending = ["run", "--camera", f"replay:{left}?fps=20&loop=1", "--link", link]
     with board(sending, tmp_path), host([*receiving, "--fifo", "8", "--pairs", "30"], tmp_path) as receiver:
         assert receiver.wait() == 0

@@ -12,7 +12,8 @@ import pytest
 
 from common.frame import PixelFormat
 from tests.support import bombs
-from tests.support.lying_board import Lie, LyingCamera, board_of
+from tests.support.board_thread import board_of
+from tests.support.lying_board import Lie, LyingCamera
 from tests.support.pictures import jpeg
 from tests.support.programs import Program, board, host, lines, until
 

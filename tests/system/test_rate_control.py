@@ -1,10 +1,7 @@
 """The board lowers its camera's rate on a cable that is too slow, says so, and raises it again; every frame is accounted for, no pair is wrong."""
 
 import json
-import socket
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -20,7 +17,7 @@ from board_agent.rate_control import RateControl, Way, ladder
 from common import now
 from common.camera.base import Grab, Mode, Offers
 from common.camera.replay import ReplayCamera, ReplaySettings
-from common.link.factory import open_link, parse_link
+from tests.support.board_thread import board_of
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, saved_numbers, write_film
 from tests.support.programs import Program, board, host, ledgers, lines, until
 from tests.support.pty_line import PtyLine
@@ -129,23 +126,10 @@ class TwoSizes(ReplayCamera):
         return both[self._shows_small]
 
 
-@contextmanager
-def two_sizes(film: Path, small: Path, uri: str) -> Iterator[Agent]:
+def two_sizes(film: Path, small: Path, uri: str) -> AbstractContextManager[Agent]:
     """A board whose camera has two sizes, in a thread."""
     camera = TwoSizes(film, small, now.monotonic_ns())
-    link = open_link(parse_link(uri, listens_by_default=True))
-    control = RateControl(ladder(camera.offers, {Way.SIZE}, 0))
-    reader, writer = socket.socketpair()
-    with reader, writer:
-        agent = Agent(camera, [link], now.random_id(), now.boot_id(), reader, control=control)
-        thread = threading.Thread(target=agent.run)
-        thread.start()
-        try:
-            yield agent
-        finally:
-            writer.send(b"\0")
-            thread.join()
-    link.close()
+    return board_of(camera, uri, RateControl(ladder(camera.offers, {Way.SIZE}, 0)))
 
 
 def test_smaller_images_are_paired_and_enlarged(film: tuple[str, int], tmp_path: Path) -> None:

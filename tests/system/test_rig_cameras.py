@@ -29,7 +29,7 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_rig
-from tests.support.lying_board import board_of
+from tests.support.board_thread import board_of
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, write_film
 from tests.support.planes import plane
 from tests.support.point_files import read_pfm

@@ -1,15 +1,12 @@
 """Both programs over two links: one is taken away and given back; numbered images are paired correctly throughout, and everything is counted."""
 
 import signal
-import socket
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from board_agent.agent import Agent
 from common import now
 from common.camera.factory import open_camera
 from common.frame import Buffer
@@ -18,6 +15,7 @@ from common.link.zeromq import ZeroMqListener
 from common.words import times
 from phone_host.bench.emulate import Profile
 from phone_host.bench.relay import relay_process
+from tests.support.board_thread import board_of
 from tests.support.keys import acquainted
 from tests.support.numbered import saved_numbers, write_film
 from tests.support.programs import board, free_port, host, ledgers, lines, until
@@ -228,21 +226,10 @@ def test_a_frame_that_comes_twice_is_paired_once(film: str, tmp_path: Path) -> N
     """What a transport delivers twice never reaches pairing: each frame makes one pair, the repetitions are counted, and the account balances."""
     out = tmp_path / "out"
     ipc = f"ipc://{tmp_path}/link"
+    receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--pairs", "30", "--json"]
     camera = open_camera(film, "board", now.monotonic_ns())
-    link = RepeatingLink(ipc, board=True)
-    reader, writer = socket.socketpair()
-    with reader, writer:
-        agent = Agent(camera, [link], now.random_id(), now.boot_id(), reader)
-        sender = threading.Thread(target=agent.run)
-        sender.start()
-        try:
-            receiving = ["run", "--camera", film, "--out", str(out), "--save-every", "1", "--pairs", "30", "--json"]
-            with host(with_links(receiving, ipc), tmp_path) as receiver:
-                assert receiver.wait() == 0
-        finally:
-            writer.send(b"\0")
-            sender.join()
-            link.close()
+    with board_of(camera, RepeatingLink(ipc, board=True)), host(with_links(receiving, ipc), tmp_path) as receiver:
+        assert receiver.wait() == 0
     report = receiver.json()
     sequences = [ledger["sequence"] for ledger in ledgers(out)]
     assert sequences == sorted(set(sequences))
