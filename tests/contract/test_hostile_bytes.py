@@ -2,21 +2,22 @@
 
 import random
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from common.errors import ProtocolError
-from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.chunking import Whole
 from common.protocol.duplex import GAP_NS, Change, Duplex
 from common.protocol.framing import LinkEnd
-from common.protocol.message import FrameMessage, Lane
+from common.protocol.message import Lane
 from common.protocol.wire import decode, encode
 from tests.fuzz.protocols import SOUND_MESSAGES
 from tests.fuzz.targets import TARGETS
 from tests.support.messages import mutated
+from tests.support.samples import FRAME
 
 CORPUS = Path(__file__).parents[1] / "fuzz" / "corpus"
 S = 1_000_000_000
@@ -103,14 +104,13 @@ def test_of_a_hundred_thousand_frames_with_flipped_bits_none_comes_altered() -> 
     marks = BoardMarks(exposed_ns=10**12, grabbed_ns=10**12 + 1, sent_ns=10**12 + 2)
     for number in range(100_000):
         payload = chance.randbytes(chance.randrange(1, 200))
-        message = FrameMessage(
+        message = replace(
+            FRAME,
             session="s",
             sent_index=number,
             sequence=number,
             width_px=640,
             height_px=480,
-            pixel_format=PixelFormat.MJPEG,
-            exposure_ns=None,
             marks=marks,
             payload=payload,
         )

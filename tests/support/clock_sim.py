@@ -10,10 +10,10 @@ import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from common.frame import PixelFormat
 from common.protocol.host_session import HostSession
-from common.protocol.message import BoardCounts, BoardHello, CameraDescription, Lane, Pacing, Ping, Pong, Rung
+from common.protocol.message import BoardCounts, BoardHello, Lane, Ping, Pong, Rung
 from common.protocol.session import Echo, Outgoing, Output, connection_name
+from tests.support.samples import CAMERA
 
 US, MS, SECOND_NS = 1_000, 1_000_000, 1_000_000_000
 HOURS_NS = 5 * 3600 * SECOND_NS
@@ -24,14 +24,6 @@ _UNIT_BYTES = 256 + 11
 
 _BITS_PER_BYTE = 10
 _LANES = {lane: connection_name(0, lane.name.encode()) for lane in (Lane.CONTROL, Lane.FRAMES)}
-_CAMERA = CameraDescription(
-    name="simulated",
-    width_px=640,
-    height_px=480,
-    pixel_format=PixelFormat.MJPEG,
-    period_ns=33 * MS,
-    pacing=Pacing.CLOCK,
-)
 
 
 class DriftingClocks:
@@ -173,7 +165,7 @@ def waves(
     """
     session, now_ns = HostSession("host", [_LANES]), clocks.start_ns
     hello = BoardHello(
-        session="board", boot_id="boot", camera=_CAMERA, counts=BoardCounts(), rung=Rung(period_ns=_CAMERA.period_ns)
+        session="board", boot_id="boot", camera=CAMERA, counts=BoardCounts(), rung=Rung(period_ns=CAMERA.period_ns)
     )
     for lane in _LANES.values():
         session.receive(lane, hello, now_ns)

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Final
 
 from common.diagnostic import Diagnostic, Severity
-from common.frame import Frame
-from common.stamp import HOST_CLOCK, Stamp
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import BoardFrame, FramePair, Processed, Result
 from phone_host.scan.patches import Patches
@@ -27,7 +25,7 @@ from phone_host.web.source import (
     Surface,
 )
 from tests.support.run_snapshots import run
-from tests.support.samples import FRAME, LEDGER
+from tests.support.samples import FRAME, LEDGER, shot
 from tests.support.stereo_pages import processed
 
 REFUSED: Final = Diagnostic("no board is chosen", "choose one first", Severity.FAIL)
@@ -93,17 +91,7 @@ class PageSource:
             return None
         ledger = replace(LEDGER, sequence=number, done_ns=(number + 1) * 50_000_000, dequeued_ns=number * 50_000_000)
         board = BoardFrame(message=FRAME, link="tcp", marks=FRAME.marks, received_ns=0, offset_ns=0, uncertainty_ns=0)
-        moment = Stamp(0, HOST_CLOCK)
-        host = Frame(
-            sequence=0,
-            exposed=moment,
-            grabbed=moment,
-            width_px=1,
-            height_px=1,
-            pixel_format=FRAME.pixel_format,
-            exposure_ns=None,
-            payload=b"",
-        )
+        host = shot(0, pixel_format=FRAME.pixel_format)
         pair = FramePair(board=board, host=host, time_skew_ns=0, paired_ns=0, queued_ns=0)
         return Newest(number, Result(number, pair, self.processed, ledger))
 

@@ -1,19 +1,20 @@
 """Small recordings of known content, and frames to be recorded."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
 from common.frame import Frame, PixelFormat
 from common.ledger import BoardMarks
 from common.orientation import UPRIGHT
-from common.protocol.message import CameraDescription, FrameMessage
+from common.protocol.message import CameraDescription
 from common.recording.layout import ABOUT, CAPTURE, About, camera_name, camera_values, topics
 from common.recording.mcap_writer import McapWriter
 from common.recording.ros_messages import RecordedImage, image_message
-from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame
 from tests.support.pictures import jpeg
+from tests.support.samples import FRAME, shot
 
 PERIOD_NS = 40_000_000
 ZERO_NS = 1_700_000_000_000_000_000
@@ -85,16 +86,8 @@ def board_frame(number: int, image: bytes, at_ns: int) -> BoardFrame:
         at_ns: now.
     """
     marks = BoardMarks(exposed_ns=at_ns - 30_000_000, grabbed_ns=at_ns - 20_000_000, sent_ns=at_ns - 10_000_000)
-    message = FrameMessage(
-        session="s",
-        sent_index=number,
-        sequence=number,
-        width_px=32,
-        height_px=24,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
-        marks=marks,
-        payload=image,
+    message = replace(
+        FRAME, session="s", sent_index=number, sequence=number, width_px=32, height_px=24, marks=marks, payload=image
     )
     return BoardFrame(
         message=message,
@@ -109,14 +102,4 @@ def board_frame(number: int, image: bytes, at_ns: int) -> BoardFrame:
 
 def own_frame(number: int, image: bytes, at_ns: int) -> Frame:
     """A frame of the own camera, exposed 20 ms ago; see `board_frame`."""
-    stamp = Stamp(at_ns - 20_000_000, HOST_CLOCK)
-    return Frame(
-        sequence=number,
-        exposed=stamp,
-        grabbed=stamp,
-        width_px=32,
-        height_px=24,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
-        payload=image,
-    )
+    return shot(number, at_ns - 20_000_000, size_px=(32, 24), payload=image)

@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from common.frame import Frame, PixelFormat
+from common.frame import PixelFormat
 from common.ledger import BoardMarks, HostMarks, StageTimes
-from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Processed, RectifiedPair, Result
-from tests.support.samples import FRAME, LEDGER
+from tests.support.samples import FRAME, LEDGER, shot
 
 
 def result(number: int) -> Result:
@@ -25,17 +24,7 @@ def result(number: int) -> Result:
         payload=b"\0" * 12,
     )
     board = BoardFrame(message=message, link="ipc", marks=marks, received_ns=number + 3, offset_ns=0, uncertainty_ns=0)
-    exposed, grabbed = Stamp(number, HOST_CLOCK), Stamp(number + 1, HOST_CLOCK)
-    host = Frame(
-        sequence=number,
-        exposed=exposed,
-        grabbed=grabbed,
-        width_px=4,
-        height_px=3,
-        pixel_format=PixelFormat.GREY,
-        exposure_ns=None,
-        payload=b"",
-    )
+    host = shot(number, number, grabbed_ns=number + 1, size_px=(4, 3), pixel_format=PixelFormat.GREY)
     image = np.full((3, 4), number % 256, np.uint8)
     ledger = replace(
         LEDGER,

@@ -6,21 +6,17 @@ world itself checks the invariants.
 """
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from common.frame import Frame, PixelFormat
-from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
 from common.protocol.host_session import HostSession
 from common.protocol.message import (
     BoardCounts,
-    CameraDescription,
     Credit,
     FrameMessage,
     HostHello,
     Lane,
     Message,
-    Pacing,
 )
 from common.protocol.session import (
     MS,
@@ -41,17 +37,9 @@ from common.protocol.session import (
     Vanished,
     connection_name,
 )
-from common.stamp import Stamp
+from tests.support.samples import CAMERA, FRAME, shot
 from tests.support.sent_frames import frame_outgoing
 
-CAMERA = CameraDescription(
-    name="simulated",
-    width_px=640,
-    height_px=480,
-    pixel_format=PixelFormat.MJPEG,
-    period_ns=33 * MS,
-    pacing=Pacing.CLOCK,
-)
 STEP_NS = 20 * MS
 
 Place = tuple[int, Lane]
@@ -218,18 +206,8 @@ class World:
     def shoot(self) -> None:
         """The camera has a frame; it is sent if there is credit."""
         if self.camera_runs and self.board.has_credit:
-            stamp = Stamp(self.now_ns, "board")
             index = self.sent[self.board.session]
-            frame = Frame(
-                sequence=index,
-                exposed=stamp,
-                grabbed=stamp,
-                width_px=640,
-                height_px=480,
-                pixel_format=PixelFormat.MJPEG,
-                exposure_ns=None,
-                payload=b"",
-            )
+            frame = shot(index, self.now_ns, "board", size_px=(640, 480))
             if self._board_sends(frame_outgoing(self.board, frame)):
                 self.board.sent(self.now_ns)
                 self.clocks[self.board.session, index] = self.boot_id
@@ -366,17 +344,7 @@ class World:
 
 def frame(session: str, sent_index: int) -> FrameMessage:
     """A frame as it was sent before."""
-    return FrameMessage(
-        session=session,
-        sent_index=sent_index,
-        sequence=0,
-        width_px=1,
-        height_px=1,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
-        marks=BoardMarks(exposed_ns=0, grabbed_ns=0, sent_ns=0),
-        payload=b"",
-    )
+    return replace(FRAME, session=session, sent_index=sent_index)
 
 
 def _dialled(place: Place) -> bytes:

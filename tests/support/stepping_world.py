@@ -10,41 +10,32 @@ from collections import deque
 from dataclasses import dataclass, replace
 from typing import Final
 
-from common.frame import Frame, PixelFormat
+from common.frame import Frame
 from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
 from common.protocol.message import (
     BoardCounts,
-    CameraDescription,
     FrameMessage,
     Lane,
     Message,
-    Pacing,
     Ping,
     Pong,
 )
 from common.protocol.session import MS, Outgoing, connection_name
-from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame
 from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import Reception
 from phone_host.sync.fifo import FifoSettings, Overflow
 from phone_host.sync.quarantine import Disbelief
+from tests.support.samples import CAMERA, FRAME, shot
 from tests.support.sent_frames import frame_outgoing
 from tests.support.witness import PERIOD_NS, Witness, WrongPair
 
 _STEP_NS: Final = 5 * MS
 _BOARD_GRABS_NS: Final = 4 * MS
 _HOST_PHASE_NS: Final = 3 * MS
-_CAMERA = CameraDescription(
-    name="simulated",
-    width_px=640,
-    height_px=480,
-    pixel_format=PixelFormat.MJPEG,
-    period_ns=PERIOD_NS,
-    pacing=Pacing.CLOCK,
-)
+_CAMERA = replace(CAMERA, period_ns=PERIOD_NS)
 _NAMES: Final = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
 
 
@@ -178,16 +169,14 @@ class SteppingWorld:
         marks = BoardMarks(
             exposed_ns=board_ns - _BOARD_GRABS_NS + by_ns, grabbed_ns=board_ns + by_ns, sent_ns=board_ns + by_ns
         )
-        return FrameMessage(
+        return replace(
+            FRAME,
             session=self._board.session,
             sent_index=self._sent,
             sequence=10**9 + self._sequence,
             width_px=640,
             height_px=480,
-            pixel_format=PixelFormat.MJPEG,
-            exposure_ns=None,
             marks=marks,
-            payload=b"",
         )
 
     # Observation.
@@ -278,17 +267,9 @@ class SteppingWorld:
         while self._board_shot_ns + PERIOD_NS + _BOARD_GRABS_NS <= self.true_ns:
             self._board_shot_ns += PERIOD_NS
             if self.true_ns > self.board.asleep_until_ns:
-                exposed = Stamp(self._board_shot_ns + self.board.shift_ns, "board")
-                grabbed = exposed.plus(_BOARD_GRABS_NS)
-                self._outbox = Frame(
-                    sequence=self._sequence,
-                    exposed=exposed,
-                    grabbed=grabbed,
-                    width_px=640,
-                    height_px=480,
-                    pixel_format=PixelFormat.MJPEG,
-                    exposure_ns=None,
-                    payload=b"",
+                exposed_ns = self._board_shot_ns + self.board.shift_ns
+                self._outbox = shot(
+                    self._sequence, exposed_ns, "board", grabbed_ns=exposed_ns + _BOARD_GRABS_NS, size_px=(640, 480)
                 )
                 self.witness.board_exposed(self._board.session, self._sequence, self._board_shot_ns)
                 self._sequence += 1
@@ -297,20 +278,8 @@ class SteppingWorld:
             self._host_shot_ns += PERIOD_NS
             if self.true_ns > self.host.asleep_until_ns and self._is_there(self.host):
                 true_ns = self._host_shot_ns + _HOST_PHASE_NS
-                exposed = Stamp(true_ns + self.host.shift_ns, HOST_CLOCK)
                 self.witness.host_exposed(self._host_sequence, true_ns)
-                self.queue.add_host(
-                    Frame(
-                        sequence=self._host_sequence,
-                        exposed=exposed,
-                        grabbed=exposed,
-                        width_px=640,
-                        height_px=480,
-                        pixel_format=PixelFormat.MJPEG,
-                        exposure_ns=None,
-                        payload=b"",
-                    )
-                )
+                self.queue.add_host(shot(self._host_sequence, true_ns + self.host.shift_ns, size_px=(640, 480)))
                 self._host_sequence += 1
 
     def _deliver(self, to: str) -> None:

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
 from common.protocol.message import (
@@ -23,7 +22,7 @@ from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import Reception
 from phone_host.sync.fifo import FifoSettings
-from tests.support.session_world import CAMERA
+from tests.support.samples import CAMERA, FRAME
 
 NAMES = {lane: connection_name(0, lane.name.encode()) for lane in Lane}
 """The connections of the only link."""
@@ -78,14 +77,13 @@ class Talk:
     def frame(self, **changes: object) -> FrameMessage:
         """The board's next frame, exposed 5 ms ago."""
         marks = BoardMarks(exposed_ns=self.now_ns - 5 * MS, grabbed_ns=self.now_ns - 2 * MS, sent_ns=self.now_ns - MS)
-        made = FrameMessage(
+        made = replace(
+            FRAME,
             session=self.board.session,
             sent_index=self.sent,
             sequence=self.sent,
             width_px=CAMERA.width_px,
             height_px=CAMERA.height_px,
-            pixel_format=PixelFormat.MJPEG,
-            exposure_ns=None,
             marks=marks,
             payload=b"image",
         )

@@ -1,13 +1,13 @@
 """What delay-bench makes of a recorded run: its delays, its losses, and predictions from them."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from common.errors import DataError
 from common.frame import PixelFormat
-from common.protocol.message import CameraDescription, Pacing
 from common.recording.layout import ABOUT, CLOCK, DELAYS, About, camera_name, camera_values, image_topic
 from common.recording.recording_file import written
 from common.recording.ros_messages import COMPRESSED_IMAGE, RecordedImage, image_message
@@ -16,6 +16,7 @@ from phone_host.bench.recorded import recorded_run
 from phone_host.sync.fifo import FifoSettings, Overflow
 from tests.support.bench_results import ledger, result
 from tests.support.recorded import payload
+from tests.support.samples import CAMERA
 
 _PERIOD_NS = 33_000_000
 _UNIX_NS = 1_700_000_000_000_000_000
@@ -42,9 +43,7 @@ def _recording(
     settings: str,
 ) -> Path:
     """A recorded run of the usual ledgers; some board frames were never sent, some pairs given up by the FIFO."""
-    camera = CameraDescription(
-        name="c", width_px=640, height_px=480, pixel_format=PixelFormat.MJPEG, period_ns=_PERIOD_NS, pacing=Pacing.CLOCK
-    )
+    camera = replace(CAMERA, period_ns=_PERIOD_NS)
     with written(path) as file:
         file.tell(ABOUT, About(unix_ns=_UNIX_NS).values())
         file.attach("settings.json", "", settings.encode(), 0)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from board_agent.cameras import Listed, table, values
 from common.camera import v4l2_abi as abi
-from common.camera.v4l2_controls import Control
 from common.camera.v4l2_device import Identity
 from common.camera.v4l2_formats import FormatOffer, Rates
+from tests.support.samples import control
 
 _RATES = Rates((Fraction(10_000_000, 333_333), Fraction(15)))
 _CAMERA = Listed(
@@ -22,19 +22,9 @@ _CAMERA = Listed(
         (FormatOffer(letters="H264", text="H.264", sizes_px=((1920, 1080),)), (((1920, 1080), _RATES),)),
     ),
     controls=(
-        (Control(id=1, name="Gain", kind=abi.CTRL_TYPE_INTEGER, minimum=0, maximum=100, step=5, default=20), 25),
+        (control(1, "Gain", abi.CTRL_TYPE_INTEGER, (0, 100, 5, 20)), 25),
         (
-            Control(
-                id=2,
-                name="Auto Exposure",
-                kind=abi.CTRL_TYPE_MENU,
-                minimum=0,
-                maximum=3,
-                step=1,
-                default=3,
-                flags=0,
-                menu=((1, "Manual"), (3, "Aperture")),
-            ),
+            control(2, "Auto Exposure", abi.CTRL_TYPE_MENU, (0, 3, 1, 3), menu=((1, "Manual"), (3, "Aperture"))),
             None,
         ),
     ),

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from board_agent.outbox import Outbox
-from common.frame import Frame, PixelFormat
+from common.frame import Frame
 from common.protocol.message import DropReason
-from common.stamp import Stamp
+from tests.support.samples import shot
 
 
 class Act(Enum):
@@ -26,17 +26,7 @@ class Act(Enum):
 
 def frame(sequence: int) -> Frame:
     """A frame that is recognized by its number."""
-    stamp = Stamp(sequence, "board")
-    return Frame(
-        sequence=sequence,
-        exposed=stamp,
-        grabbed=stamp,
-        width_px=1,
-        height_px=1,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
-        payload=b"",
-    )
+    return shot(sequence, sequence, "board")
 
 
 @given(st.lists(st.sampled_from(Act), max_size=60))

@@ -12,21 +12,12 @@ from board_agent.outbox import Outbox
 from board_agent.rate_control import RateControl, Way, ladder, ways
 from common.camera.base import Mode, Offers
 from common.errors import SettingsError
-from common.frame import Frame, PixelFormat
-from common.stamp import Stamp
+from common.frame import PixelFormat
+from tests.support.samples import shot
 
 MS = 1_000_000
 S = 1_000_000_000
-FRAME = Frame(
-    sequence=0,
-    exposed=Stamp(0, "board"),
-    grabbed=Stamp(0, "board"),
-    width_px=8,
-    height_px=8,
-    pixel_format=PixelFormat.GREY,
-    exposure_ns=None,
-    payload=bytes(64),
-)
+FRAME = shot(0, 0, "board", size_px=(8, 8), pixel_format=PixelFormat.GREY, payload=bytes(64))
 
 OFFERS = Offers((50 * MS, 100 * MS, 200 * MS, 400 * MS), (90, 68, 41))
 """20, 10, 5 and 2.5 frames a second; three qualities."""

@@ -1,15 +1,17 @@
 """Which cameras a rig takes, which it refuses, and which controls are doubted."""
 
+from dataclasses import replace
+
 import pytest
 
 from common.camera_identity import UNKNOWN_CAMERA, CameraIdentity, Lock, RememberedCamera, identity_of
 from common.errors import DataError
-from common.frame import PixelFormat
 from common.orientation import UPRIGHT, Orientation
-from common.protocol.message import CameraDescription, Pacing
+from common.protocol.message import CameraDescription
 from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.run_rules import misses, require_camera, settings_concerns, state_of
 from phone_host.model import Side
+from tests.support.samples import CAMERA
 
 C920 = CameraIdentity("uvcvideo", "HD Pro Webcam C920", "A1")
 OTHER_C920 = CameraIdentity("uvcvideo", "HD Pro Webcam C920", "B2")
@@ -19,16 +21,7 @@ CHEAP = CameraIdentity("uvcvideo", "USB Camera", "")
 
 def described(identity: CameraIdentity, orientation: Orientation = UPRIGHT) -> CameraDescription:
     """A camera of 640x480."""
-    return CameraDescription(
-        name="x",
-        width_px=640,
-        height_px=480,
-        pixel_format=PixelFormat.MJPEG,
-        period_ns=33_000_000,
-        pacing=Pacing.CLOCK,
-        identity=identity,
-        orientation=orientation,
-    )
+    return replace(CAMERA, identity=identity, orientation=orientation)
 
 
 def check(rig: RememberedCamera, present: CameraDescription, other: CameraIdentity = UNKNOWN_CAMERA) -> None:

@@ -1,6 +1,7 @@
 """Pictures out of a recording: for calibrate, quality and stereo the stillest ones, for calibrate-time all."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,9 +12,8 @@ from hypothesis import strategies as st
 
 from common.camera_identity import CameraIdentity
 from common.errors import DataError, SettingsError, UnavailableError
-from common.frame import PixelFormat
 from common.orientation import Flip, Orientation
-from common.protocol.message import CameraDescription, Pacing
+from common.protocol.message import CameraDescription
 from phone_host.calibration.target.cameras_beside import cameras_beside
 from phone_host.jobs.picture_pairs import given_pictures
 from phone_host.model import Side
@@ -22,6 +22,7 @@ from phone_host.recording.copied import copy_recording
 from phone_host.recording.footage import read_recording
 from phone_host.stereo.view_files import pair_files
 from tests.support.recorded import LATE_NS, PERIOD_NS, ZERO_NS, payload, recording, recording_file
+from tests.support.samples import CAMERA
 
 _ANY_SIZE = 10**6
 _STILL = (7, 40)
@@ -39,13 +40,11 @@ def _moving(side: str, number: int) -> bytes:
 
 
 def _camera(turned: Orientation) -> CameraDescription:
-    return CameraDescription(
-        name="cam",
+    return replace(
+        CAMERA,
         width_px=128,
         height_px=96,
-        pixel_format=PixelFormat.MJPEG,
         period_ns=PERIOD_NS,
-        pacing=Pacing.CLOCK,
         orientation=turned,
         identity=CameraIdentity("uvcvideo", "Cam", "7"),
     )

@@ -3,6 +3,7 @@
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,6 @@ import pytest
 from common import now
 from common.diagnostic import Diagnostic, Severity
 from common.errors import SettingsError
-from common.frame import PixelFormat
-from common.protocol.message import CameraDescription, Pacing
 from common.recording.opened import open_recorded
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Side
@@ -19,15 +18,9 @@ from phone_host.recording.begin import begin_recording
 from phone_host.recording.switch import RecordingSwitch
 from tests.support.programs import until
 from tests.support.recorded import board_frame, own_frame, payload
+from tests.support.samples import CAMERA
 
-_CAMERA = CameraDescription(
-    name="cam",
-    width_px=32,
-    height_px=24,
-    pixel_format=PixelFormat.MJPEG,
-    period_ns=40_000_000,
-    pacing=Pacing.CLOCK,
-)
+_CAMERA = replace(CAMERA, width_px=32, height_px=24)
 
 
 def _bring(switch: RecordingSwitch, number: int, image: bytes = payload(0)) -> None:

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from common import now
 from common.errors import DataError
-from common.frame import Frame, PixelFormat
+from common.frame import PixelFormat
 from common.ledger import BoardMarks
-from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Image, Side
 from phone_host.run.pipeline import Pipeline
 from phone_host.stereo.core import StereoCore
@@ -22,7 +21,7 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from tests.support.pictures import encoded
 from tests.support.planes import Plane, plane
-from tests.support.samples import FRAME
+from tests.support.samples import FRAME, shot
 
 _SCENE: Final = plane(shortest_px=14.0)
 """Textures that half of the pixels still show: Shannon's limit there is 4 px."""
@@ -37,7 +36,7 @@ def halved(image: Image) -> Image:
 def pair_of(left: Image, right: Image, board_side: Side, asked_px: tuple[int, int]) -> FramePair:
     """Two frames as they come to the worker."""
     board, host = (left, right) if board_side is Side.LEFT else (right, left)
-    marks, stamp = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1), Stamp(1, HOST_CLOCK)
+    marks = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1)
     message = replace(
         FRAME,
         sequence=7,
@@ -50,15 +49,8 @@ def pair_of(left: Image, right: Image, board_side: Side, asked_px: tuple[int, in
     frame = BoardFrame(
         message=message, link="tcp", marks=marks, received_ns=1, offset_ns=0, uncertainty_ns=0, asked_px=asked_px
     )
-    own = Frame(
-        sequence=0,
-        exposed=stamp,
-        grabbed=stamp,
-        width_px=host.shape[1],
-        height_px=host.shape[0],
-        pixel_format=PixelFormat.PNG,
-        exposure_ns=None,
-        payload=encoded(".png", host),
+    own = shot(
+        0, 1, size_px=(host.shape[1], host.shape[0]), pixel_format=PixelFormat.PNG, payload=encoded(".png", host)
     )
     return FramePair(board=frame, host=own, time_skew_ns=0, paired_ns=1, queued_ns=1)
 

@@ -8,10 +8,9 @@ import pytest
 
 from common import now
 from common.errors import DataError
-from common.frame import Frame, FrameFault, ImageSizeError, PixelFormat, SpoiledImageError
+from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageError
 from common.imagesize.head import MEGAPIXEL
 from common.ledger import BoardMarks
-from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, Side
 from phone_host.run.pipeline import Pipeline
 from phone_host.stereo.core import StereoCore
@@ -21,7 +20,7 @@ from phone_host.stereo.matcher_names import MatcherName
 from tests.support import bombs
 from tests.support.decoder_watch import watched_decoder
 from tests.support.pictures import encoded, jpeg, picture
-from tests.support.samples import FRAME
+from tests.support.samples import FRAME, shot
 
 JPEG, PNG = PixelFormat.MJPEG, PixelFormat.PNG
 
@@ -34,7 +33,7 @@ def pair_of(
     own_px: tuple[int, int] = (64, 48),
 ) -> FramePair:
     """A board's frame as it came, beside a sound one of the host's camera."""
-    marks, stamp = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1), Stamp(1, HOST_CLOCK)
+    marks = BoardMarks(exposed_ns=1, grabbed_ns=1, sent_ns=1)
     message = replace(
         FRAME,
         sequence=7,
@@ -44,16 +43,7 @@ def pair_of(
         marks=marks,
         payload=board,
     )
-    own = Frame(
-        sequence=0,
-        exposed=stamp,
-        grabbed=stamp,
-        width_px=own_px[0],
-        height_px=own_px[1],
-        pixel_format=JPEG,
-        exposure_ns=None,
-        payload=jpeg(*own_px),
-    )
+    own = shot(0, 1, size_px=own_px, payload=jpeg(*own_px))
     return FramePair(
         board=BoardFrame(
             message=message, link="tcp", marks=marks, received_ns=1, offset_ns=0, uncertainty_ns=0, asked_px=asked_px

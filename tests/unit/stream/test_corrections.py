@@ -25,7 +25,7 @@ from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.receiver import Receiver
 from tests.support.pictures import jpeg
 from tests.support.programs import until
-from tests.support.session_world import CAMERA
+from tests.support.samples import CAMERA
 
 ORDERS = 2000
 LAST_NS = 1_000_000

@@ -9,15 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common import now
-from common.frame import Frame, PixelFormat
+from common.frame import Frame
 from common.ledger import BoardMarks
 from common.protocol.message import CameraDescription, Pacing
-from common.stamp import HOST_CLOCK, Stamp
 from phone_host.model import BoardFrame, FramePair, PairCounts
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.sync.fifo import FifoSettings, Overflow
-from tests.support.samples import FRAME
+from tests.support.samples import CAMERA, FRAME, shot
 
 MS = 1_000_000
 PERIOD_NS = 33 * MS
@@ -44,24 +43,12 @@ def board_frame(sequence: int, exposed_ns: int, received_ns: int | None = None) 
 
 def host_frame(sequence: int, exposed_ns: int, payload: bytes = b"") -> Frame:
     """A frame of the host's camera."""
-    stamp = Stamp(exposed_ns, HOST_CLOCK)
-    return Frame(
-        sequence=sequence,
-        exposed=stamp,
-        grabbed=stamp,
-        width_px=1,
-        height_px=1,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
-        payload=payload,
-    )
+    return shot(sequence, exposed_ns, payload=payload)
 
 
 def camera_of(period_ns: int, pacing: Pacing = Pacing.CLOCK) -> CameraDescription:
     """A board's camera with that period."""
-    return CameraDescription(
-        name="board's", width_px=640, height_px=480, pixel_format=PixelFormat.MJPEG, period_ns=period_ns, pacing=pacing
-    )
+    return replace(CAMERA, period_ns=period_ns, pacing=pacing)
 
 
 def queue_of(depth: int = 1, overflow: Overflow = Overflow.DROP_OLDEST) -> PairQueue:

@@ -37,7 +37,7 @@ from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.quarantine import Disbelief
-from tests.support.session_world import CAMERA
+from tests.support.samples import CAMERA
 from tests.support.talk import NAMES, Talk
 from tests.support.unkept import Unkept
 

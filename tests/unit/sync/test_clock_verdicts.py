@@ -15,7 +15,8 @@ from phone_host.sync.allowed_lines import Spacing, allowed_lines, believe
 from phone_host.sync.clock import ClockEstimator, Heard
 from phone_host.sync.clocks import LinkClocks
 from phone_host.sync.quarantine import Disbelief
-from tests.support.session_world import CAMERA, frame
+from tests.support.samples import CAMERA
+from tests.support.session_world import frame
 from tests.support.two_clocks import START_NS, TwoClocks
 
 MS, SECOND_NS = 1_000_000, 1_000_000_000

@@ -7,86 +7,32 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.camera import v4l2_abi as abi
-from common.camera.v4l2_controls import Axis, Control, ControlPlan, ControlWishes, PowerLine, lower_qualities
+from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, PowerLine, lower_qualities
+from tests.support.samples import control
 
-_AUTO_EXPOSURE = Control(
-    id=abi.CID_AUTO_EXPOSURE,
-    name="Auto Exposure",
-    kind=abi.CTRL_TYPE_MENU,
-    minimum=0,
-    maximum=3,
-    step=1,
-    default=3,
-    flags=0,
-    menu=((1, "Manual"), (3, "Aperture")),
+_AUTO_EXPOSURE = control(
+    abi.CID_AUTO_EXPOSURE, "Auto Exposure", abi.CTRL_TYPE_MENU, (0, 3, 1, 3), menu=((1, "Manual"), (3, "Aperture"))
 )
-_EXPOSURE = Control(
-    id=abi.CID_EXPOSURE_TIME_ABSOLUTE,
-    name="Exposure Time",
-    kind=abi.CTRL_TYPE_INTEGER,
-    minimum=1,
-    maximum=5000,
-    step=1,
-    default=156,
+_EXPOSURE = control(
+    abi.CID_EXPOSURE_TIME_ABSOLUTE,
+    "Exposure Time",
+    abi.CTRL_TYPE_INTEGER,
+    (1, 5000, 1, 156),
     flags=abi.CTRL_FLAG_INACTIVE,
 )
-_DYNAMIC = Control(
-    id=abi.CID_EXPOSURE_DYNAMIC_FRAMERATE,
-    name="Dynamic Framerate",
-    kind=abi.CTRL_TYPE_BOOLEAN,
-    minimum=0,
-    maximum=1,
-    step=1,
-    default=0,
+_DYNAMIC = control(abi.CID_EXPOSURE_DYNAMIC_FRAMERATE, "Dynamic Framerate", abi.CTRL_TYPE_BOOLEAN, (0, 1, 1, 0))
+_GAIN = control(abi.CID_GAIN, "Gain", abi.CTRL_TYPE_INTEGER, (0, 100, 10, 0))
+_AUTO_WHITE = control(abi.CID_WHITE_BALANCE_AUTOMATIC, "White Balance, Auto", abi.CTRL_TYPE_BOOLEAN, (0, 1, 1, 1))
+_WHITE = control(
+    abi.CID_WHITE_BALANCE_TEMPERATURE, "White Balance", abi.CTRL_TYPE_INTEGER, (2800, 6500, 1, 4600), flags=0x10
 )
-_GAIN = Control(id=abi.CID_GAIN, name="Gain", kind=abi.CTRL_TYPE_INTEGER, minimum=0, maximum=100, step=10, default=0)
-_AUTO_WHITE = Control(
-    id=abi.CID_WHITE_BALANCE_AUTOMATIC,
-    name="White Balance, Auto",
-    kind=abi.CTRL_TYPE_BOOLEAN,
-    minimum=0,
-    maximum=1,
-    step=1,
-    default=1,
-)
-_WHITE = Control(
-    id=abi.CID_WHITE_BALANCE_TEMPERATURE,
-    name="White Balance",
-    kind=abi.CTRL_TYPE_INTEGER,
-    minimum=2800,
-    maximum=6500,
-    step=1,
-    default=4600,
-    flags=0x10,
-)
-_AUTO_FOCUS = Control(
-    id=abi.CID_FOCUS_AUTOMATIC_CONTINUOUS,
-    name="Focus, Auto",
-    kind=abi.CTRL_TYPE_BOOLEAN,
-    minimum=0,
-    maximum=1,
-    step=1,
-    default=1,
-)
-_FOCUS = Control(
-    id=abi.CID_FOCUS_ABSOLUTE,
-    name="Focus",
-    kind=abi.CTRL_TYPE_INTEGER,
-    minimum=0,
-    maximum=250,
-    step=5,
-    default=0,
-    flags=abi.CTRL_FLAG_INACTIVE,
-)
-_MAINS = Control(
-    id=abi.CID_POWER_LINE_FREQUENCY,
-    name="Power Line",
-    kind=abi.CTRL_TYPE_MENU,
-    minimum=0,
-    maximum=2,
-    step=1,
-    default=2,
-    flags=0,
+_AUTO_FOCUS = control(abi.CID_FOCUS_AUTOMATIC_CONTINUOUS, "Focus, Auto", abi.CTRL_TYPE_BOOLEAN, (0, 1, 1, 1))
+_FOCUS = control(abi.CID_FOCUS_ABSOLUTE, "Focus", abi.CTRL_TYPE_INTEGER, (0, 250, 5, 0), flags=abi.CTRL_FLAG_INACTIVE)
+_MAINS = control(
+    abi.CID_POWER_LINE_FREQUENCY,
+    "Power Line",
+    abi.CTRL_TYPE_MENU,
+    (0, 2, 1, 2),
     menu=((0, "Off"), (1, "50"), (2, "60")),
 )
 _WEBCAM = (_WHITE, _AUTO_WHITE, _GAIN, _MAINS, _FOCUS, _AUTO_FOCUS, _EXPOSURE, _AUTO_EXPOSURE, _DYNAMIC)
@@ -155,17 +101,7 @@ def test_an_automatism_without_a_value_is_switched_off() -> None:
 
 def test_shutter_priority_stands_in_for_manual() -> None:
     """A camera whose menu has no manual mode is fixed in shutter priority."""
-    menu = Control(
-        id=abi.CID_AUTO_EXPOSURE,
-        name="Auto Exposure",
-        kind=abi.CTRL_TYPE_MENU,
-        minimum=0,
-        maximum=3,
-        step=1,
-        default=3,
-        flags=0,
-        menu=((0, "A"), (2, "S")),
-    )
+    menu = control(abi.CID_AUTO_EXPOSURE, "Auto Exposure", abi.CTRL_TYPE_MENU, (0, 3, 1, 3), menu=((0, "A"), (2, "S")))
     steps = ControlPlan((menu, _EXPOSURE)).to_start(ControlWishes(((Axis.EXPOSURE, 50),)))
     assert _set([*steps]) == [("Auto Exposure", 2), ("Exposure Time", 50)]
 
@@ -173,9 +109,7 @@ def test_shutter_priority_stands_in_for_manual() -> None:
 @pytest.mark.parametrize("flag", [abi.CTRL_FLAG_GRABBED, abi.CTRL_FLAG_READ_ONLY, abi.CTRL_FLAG_DISABLED])
 def test_controls_that_cannot_be_set_are_not_tried(flag: int) -> None:
     """Grabbed, read-only and disabled controls are left alone. Inactive ones are set, as they become active when their automatic mode is off."""
-    gain = Control(
-        id=abi.CID_GAIN, name="Gain", kind=abi.CTRL_TYPE_INTEGER, minimum=0, maximum=100, step=1, default=0, flags=flag
-    )
+    gain = control(abi.CID_GAIN, "Gain", abi.CTRL_TYPE_INTEGER, (0, 100, 1, 0), flags=flag)
     assert ControlPlan((gain,)).to_start(ControlWishes(((Axis.GAIN, 5),))) == []
     assert _EXPOSURE.can_be_set
 
@@ -185,30 +119,14 @@ def test_controls_that_cannot_be_set_are_not_tried(flag: int) -> None:
 )
 def test_values_are_fitted_to_the_range(value: int, low: int, span: int, step: int) -> None:
     """A fitted value lies in the range, on the grid or at its end, and no further than half a step from the nearest possible value."""
-    control = Control(
-        id=abi.CID_GAIN,
-        name="Gain",
-        kind=abi.CTRL_TYPE_INTEGER,
-        minimum=low,
-        maximum=low + span,
-        step=step,
-        default=low,
-    )
-    fitted = control.fitted(value)
+    made = control(abi.CID_GAIN, "Gain", abi.CTRL_TYPE_INTEGER, (low, low + span, step, low))
+    fitted = made.fitted(value)
     assert low <= fitted <= low + span
     assert (fitted - low) % max(1, step) == 0 or fitted == low + span
     assert abs(fitted - min(max(value, low), low + span)) <= max(1, step) // 2 + 1
 
 
-_QUALITY = Control(
-    id=abi.CID_JPEG_COMPRESSION_QUALITY,
-    name="Compression Quality",
-    kind=abi.CTRL_TYPE_INTEGER,
-    minimum=1,
-    maximum=100,
-    step=1,
-    default=80,
-)
+_QUALITY = control(abi.CID_JPEG_COMPRESSION_QUALITY, "Compression Quality", abi.CTRL_TYPE_INTEGER, (1, 100, 1, 80))
 
 
 def test_a_quality_is_set_before_the_stream_and_again_after_a_loss() -> None:

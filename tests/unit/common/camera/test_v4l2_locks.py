@@ -16,6 +16,7 @@ from common.camera.v4l2_open_controls import OpenControls
 from common.camera.v4l2_serial import serial_number
 from common.camera.v4l2_tally import Tally
 from common.camera_identity import Lock
+from tests.support.samples import control
 
 
 @given(st.sampled_from(Lock), st.integers(1, 2**31 - 1))
@@ -36,17 +37,12 @@ def test_gain_is_no_lock() -> None:
 
 def integer(control_id: int, low: int, high: int, step: int = 1, flags: int = 0) -> Control:
     """An integer control."""
-    return Control(
-        id=control_id, name=f"{control_id:x}", kind=abi.CTRL_TYPE_INTEGER, minimum=low, maximum=high, step=step, default=low,
-        flags=flags,
-    )  # fmt: skip
+    return control(control_id, f"{control_id:x}", abi.CTRL_TYPE_INTEGER, (low, high, step, low), flags=flags)  # fmt: skip
 
 
 def switch(control_id: int) -> Control:
     """A switch that is on."""
-    return Control(
-        id=control_id, name=f"{control_id:x}", kind=abi.CTRL_TYPE_BOOLEAN, minimum=0, maximum=1, step=1, default=1
-    )
+    return control(control_id, f"{control_id:x}", abi.CTRL_TYPE_BOOLEAN, (0, 1, 1, 1))
 
 
 class Driver:

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from common.frame import PixelFormat
 from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
-from common.protocol.message import BoardCounts, FrameMessage, Lane, Ping
+from common.protocol.message import BoardCounts, Lane, Ping
 from common.protocol.session import MS, Outgoing, connection_name
 from phone_host.stream.link_facts import LinkFacts
 from phone_host.stream.reception import Reception
-from tests.support.session_world import CAMERA
+from tests.support.samples import CAMERA, FRAME
 from tests.support.unkept import Unkept
 
 LANES = [{lane: connection_name(link, lane.name.encode()) for lane in Lane} for link in range(2)]
@@ -106,16 +105,8 @@ def test_a_frame_tells_the_age_of_its_line() -> None:
     lines = TwoLines(MS, 400 * MS, self_paced=True)
     lines.run(1_000 * MS)
     marks = BoardMarks(exposed_ns=lines.now_ns - 5 * MS, grabbed_ns=lines.now_ns - 2 * MS, sent_ns=lines.now_ns - MS)
-    frame = FrameMessage(
-        session="life",
-        sent_index=0,
-        sequence=0,
-        width_px=CAMERA.width_px,
-        height_px=CAMERA.height_px,
-        pixel_format=PixelFormat.MJPEG,
-        exposure_ns=None,
-        marks=marks,
-        payload=b"image",
+    frame = replace(
+        FRAME, session="life", width_px=CAMERA.width_px, height_px=CAMERA.height_px, marks=marks, payload=b"image"
     )
     lines.reception.receive(LANES[0][Lane.FRAMES], frame, lines.now_ns)
     lines.run(1_000 * MS)

@@ -32,7 +32,8 @@ from common.protocol.session import (
 )
 from common.protocol.waves import OLD_NS, SLOW_ECHO_NS, WAVE_ECHOES_EARLY, YOUNG_NS
 from common.protocol.wire import decode, encode_stamped
-from tests.support.session_world import CAMERA, World, frame
+from tests.support.samples import CAMERA
+from tests.support.session_world import World, frame
 
 
 def test_echoes_of_another_life_are_ignored() -> None:

@@ -37,8 +37,8 @@ from common.protocol.session import (
     StaleReason,
     connection_name,
 )
-from tests.support.samples import FRAME
-from tests.support.session_world import CAMERA, HostNode, World
+from tests.support.samples import CAMERA, FRAME
+from tests.support.session_world import HostNode, World
 
 LINKS = 2
 

@@ -26,7 +26,7 @@ from common.protocol.session import MS, STATUS_NS, Accepted, LocksTold, Outgoing
 from common.protocol.wire import MAX_HEADER_BYTES, decode, encode
 from common.versions import PROTOCOL_VERSION
 from phone_host.stream.lock_asking import LockAsking
-from tests.support.session_world import CAMERA
+from tests.support.samples import CAMERA
 
 NOW_NS = 10**12
 NONE = BoardCounts()

@@ -25,7 +25,8 @@ from common.protocol.message import (
     Steer,
 )
 from common.protocol.session import MS, SILENCE_NS, LinkDown, LinkUp, Outgoing, connection_name
-from tests.support.session_world import CAMERA, frame
+from tests.support.samples import CAMERA
+from tests.support.session_world import frame
 
 NOW_NS = 10**12
 NONE = BoardCounts()

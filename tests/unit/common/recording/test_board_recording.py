@@ -15,8 +15,8 @@ from common.recording.disk_queue import WriteEnd
 from common.recording.layout import ABOUT, About
 from common.recording.opened import open_recorded
 from common.recording.recording_file import RecordingFile
-from common.stamp import Stamp
 from tests.support.pictures import jpeg
+from tests.support.samples import shot
 
 _UNIX_NS = 1_700_000_000 * 10**9
 _RING_BYTES = 800_000
@@ -27,14 +27,13 @@ def _begin(file: RecordingFile) -> None:
 
 
 def _frame(number: int) -> Frame:
-    return Frame(
-        sequence=number,
-        exposed=Stamp(number * 40_000_000, "board:boot"),
-        grabbed=Stamp(number * 40_000_000 + 9_000_000, "board:boot"),
-        width_px=160,
-        height_px=120,
+    return shot(
+        number,
+        number * 40_000_000,
+        "board:boot",
+        grabbed_ns=number * 40_000_000 + 9_000_000,
+        size_px=(160, 120),
         pixel_format=PixelFormat.GREY,
-        exposure_ns=None,
         payload=bytes([number % 251]) * 19_200,
     )
 

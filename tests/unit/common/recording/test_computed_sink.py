@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from common.errors import SettingsError
-from common.frame import PixelFormat
 from common.ledger import StageTimes
-from common.protocol.message import CameraDescription, Pacing
 from common.recording.inflate import inflate
 from common.recording.layout import CLOUD, DEPTH
 from common.recording.mcap_records import Message
@@ -24,11 +22,9 @@ from phone_host.run.recording_sinks import Computed, ComputedSink, cloud_data
 from tests.support.programs import until
 from tests.support.recorded import own_frame, payload
 from tests.support.requests import request_of
-from tests.support.samples import LEDGER
+from tests.support.samples import CAMERA, LEDGER
 
-_CAMERA = CameraDescription(
-    name="cam", width_px=32, height_px=24, pixel_format=PixelFormat.MJPEG, period_ns=40_000_000, pacing=Pacing.CLOCK
-)
+_CAMERA = replace(CAMERA, width_px=32, height_px=24)
 _NAN = np.nan
 _CLOUD_M = np.array([[[0.1, 0.2, 1.5], [_NAN, _NAN, _NAN]], [[-0.3, 0.0, 2.25], [0.0, 0.0, 0.75]]], np.float32)
 _DEPTH_MM = [[1500, 0], [2250, 750]]
