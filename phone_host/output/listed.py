@@ -28,7 +28,16 @@ from common.files import read_file, replacing_in, sync_folder
 from common.plain_text import writable
 from common.unfinished import unfinished, weakly
 from phone_host.output.folder_lock import FolderLock, Length
-from phone_host.output.move_up import STAGED, WHOLE, begin_move, finish_move, keep_under
+from phone_host.output.move_up import (
+    REPLACED,
+    STAGED,
+    WHOLE,
+    begin_move,
+    finish_move,
+    keep_under,
+    leave_partial,
+    remove_set,
+)
 from phone_host.output.open_folders import (
     FOLDER,
     INNER,
@@ -39,7 +48,6 @@ from phone_host.output.open_folders import (
     sync_file,
     way_to,
 )
-from phone_host.output.partial_set import REPLACED, leave_partial, remove_set
 from phone_host.output.report_owner import names_of_other_report
 
 LIST: Final = ".tandemscan"

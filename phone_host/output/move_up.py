@@ -6,6 +6,7 @@ by a program of another verb. It reads only names in this folder from the plan. 
 """
 
 import os
+import re
 import stat
 from collections.abc import Collection, Mapping
 from contextlib import suppress
@@ -15,13 +16,16 @@ from typing import Final
 from common.errors import DataError
 from common.files import read_file, replacing_in, sync_folder
 from phone_host.output.json_text import json_text, json_value
-from phone_host.output.open_folders import FOLDER, entries_of, remove_result, sync_file
+from phone_host.output.open_folders import FOLDER, entries_of, plain_name, remove_result, sync_file
 
 STAGED: Final = ".tandemscan.new"
 """Name of the folder for results that are not whole yet."""
 
 WHOLE: Final = ".tandemscan.whole"
 """Name of the folder for results that are whole, and not all moved up yet."""
+
+REPLACED: Final = ".tandemscan.old"
+"""Name of an earlier partial set while a later one takes its place."""
 
 _PLAN: Final = ".plan.json"
 _REMOVE, _RENAME = "remove", "rename"
@@ -136,3 +140,47 @@ def _make_place(name: str, whole: int, folder: int) -> None:
         is_folder = stat.S_ISDIR(os.lstat(name, dir_fd=folder).st_mode)
         if is_folder or stat.S_ISDIR(os.lstat(name, dir_fd=whole).st_mode):
             remove_result(name, folder)
+
+
+def leave_partial(folder: int, name: str, names: re.Pattern[str]) -> bool:
+    """Give staged results that are not whole the name of a partial set, visible and one for each verb, in place of one that was left before; return whether that was possible.
+
+    Args:
+        folder: descriptor of the folder of results.
+        name: of the partial set; a file or link of this name stays, and nothing is done.
+        names: pattern of the results' names.
+
+    Raises:
+        OSError: as the operating system reports it.
+    """
+    if name in entries_of(folder) and not _is_folder(name, folder):
+        return False
+    remove_set(REPLACED, folder, names)
+    with suppress(FileNotFoundError):
+        os.rename(name, REPLACED, src_dir_fd=folder, dst_dir_fd=folder)
+    os.rename(STAGED, name, src_dir_fd=folder, dst_dir_fd=folder)
+    sync_folder(folder)
+    remove_set(REPLACED, folder, names)
+    return True
+
+
+def remove_set(name: str, folder: int, names: re.Pattern[str]) -> None:
+    """Remove a folder with a set of results, if it is there; what others have put into it stays, in `NAME.foreign`.
+
+    Raises:
+        OSError: as the operating system reports it.
+    """
+    if name not in entries_of(folder) or not _is_folder(name, folder):
+        return
+    inside = os.open(name, FOLDER, dir_fd=folder)
+    try:
+        for entry in entries_of(inside):
+            if names.fullmatch(plain_name(entry)):
+                remove_result(entry, inside)
+    finally:
+        os.close(inside)
+    remove_result(name, folder)
+
+
+def _is_folder(name: str, folder: int) -> bool:
+    return stat.S_ISDIR(os.lstat(name, dir_fd=folder).st_mode)

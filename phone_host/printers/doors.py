@@ -1,15 +1,18 @@
 """The doors to printers by their addresses, and the keys of those that want one. The only place that knows all of them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, assert_never
 
-from common.errors import SettingsError
-from phone_host.printers.door import PrinterDoor
-from phone_host.printers.file_door import FileDoor
+from common.byte_order_mark import without_mark
+from common.errors import SettingsError, UnavailableError
+from phone_host.output.atomic import write_bytes
+from phone_host.printers.door import Job, PrinterDoor, Wishes
+from phone_host.printers.host_commands import passed_note
 from phone_host.printers.moonraker import Moonraker
 from phone_host.printers.octoprint import OctoPrint
 from phone_host.printers.printer_uri import FileUri, LineUri, PrinterUri, ServerKind, ServerUri, read_uri
+from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.prusalink import PrusaLink
 from phone_host.printers.sending import LineDoor
 from phone_host.printers.server_door import ServerDoor, ServerPatience
@@ -18,6 +21,41 @@ _MOST_KEY: Final = 200
 _BUSY_KEY: Final = "max_busy_minutes"
 _BUSY_MIN: Final = 60.0
 _MAX_BUSY_MIN: Final = 100_000
+_HOT = "its G-code leaves heaters on: the printer stays hot at the end"
+
+
+class FileDoor:
+    """A file for a printer: what `--printer file:OUT.gcode` means. See PrinterDoor.
+
+    Args:
+        path: of the file; there must be none yet.
+    """
+
+    leaving_s = 0.0
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def require_ready(self) -> None:
+        """See PrinterDoor."""
+        if self._path.exists():
+            raise SettingsError(f"{self._path} exists", "give a new name, or remove it")
+        if not self._path.parent.is_dir():
+            raise SettingsError(f"{self._path.parent} is no folder", "make it, or give another name")
+
+    def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
+        """See PrinterDoor."""
+        del wishes
+        self.require_ready()
+        tell(Progress(phase=Phase.SENDING))
+        try:
+            write_bytes(self._path, without_mark(job.gcode.read_bytes()))
+        except OSError as error:
+            raise UnavailableError(
+                f"{self._path} cannot be written ({error.strerror})", "make room on the disk, or give another name"
+            ) from None
+        notes = (_HOT,) * job.facts.leaves_hot + passed_note(job.facts.host_commands, "whoever prints the file")
+        return Ended(phase=Phase.DONE, share=1.0, notes=notes)
 
 
 def door_to(

@@ -63,12 +63,8 @@ def coverage_card(series: CalibrationSeries) -> str:
 
 def _coverage(name: str, corners: list[Floats], size: Size) -> str:
     counts = tile_views(corners, size)
-    drawn = two_widths(partial(_map, corners, size, counts, f"corners seen in the {name} image"), HALF_PX)
+    drawn = two_widths(partial(coverage_map, corners, size, counts, f"corners seen in the {name} image"), HALF_PX)
     return f'<div><h3>{name} camera</h3>{drawn}<p class="sub">{escape(_empty_words(counts))}</p></div>'
-
-
-def _map(corners: list[Floats], size: Size, counts: NDArray[np.int64], label: str, width_px: int) -> str:
-    return coverage_map(corners, size, counts, label, width_px)
 
 
 def _empty_words(counts: NDArray[np.int64]) -> str:
@@ -152,12 +148,7 @@ def views_card(series: CalibrationSeries) -> str:
         " come first. Arrows that all point one way: the board or a camera moved; arrows at one end: blur, glare or a board that is"
         " not flat."
     )
-    shown = worst[:_MOST_PICTURES]
-    content = f'<div class="views2">{"".join(_view(view, series, scale) for view in shown[:_MOST_SHOWN])}</div>'
-    if len(shown) > _MOST_SHOWN:
-        more = "".join(_view(view, series, scale) for view in shown[_MOST_SHOWN:])
-        rest = counted(len(shown) - _MOST_SHOWN, "more view", "more views")
-        content += f'<details><summary>{rest}</summary><div class="views2">{more}</div></details>'
+    content = _pictures(worst[:_MOST_PICTURES], series, scale)
     rows = [
         (view.name, f"{_one_rms(view.left):.3f}", f"{_one_rms(view.right):.3f}", _vertical(view), *_in_space(view))
         for view in used
@@ -178,16 +169,22 @@ def rejected_card(series: CalibrationSeries) -> str:
     scale = Enlarged(1.0, 1.0)
     seen = [view for view in out if view.left.picture or view.right.picture][:_MOST_PICTURES]
     unseen = [view for view in out if view not in seen]
-    content = ""
-    if seen:
-        content += f'<div class="views2">{"".join(_view(view, series, scale) for view in seen[:_MOST_SHOWN])}</div>'
-        if len(seen) > _MOST_SHOWN:
-            more = "".join(_view(view, series, scale) for view in seen[_MOST_SHOWN:])
-            rest = counted(len(seen) - _MOST_SHOWN, "more view", "more views")
-            content += f'<details><summary>{rest}</summary><div class="views2">{more}</div></details>'
+    content = _pictures(seen, series, scale) if seen else ""
     if unseen:
         content += table(("pair", "why"), [(view.name, _why(view)) for view in unseen])
     return section(f"Not used: {counted(len(out), 'pair')}", "Dots are corners that were found.", content)
+
+
+def _pictures(shown: list[SeriesView], series: CalibrationSeries, scale: Enlarged) -> str:
+    """Show the first views; the others on demand."""
+    first, more = (
+        f'<div class="views2">{"".join(_view(view, series, scale) for view in views)}</div>'
+        for views in (shown[:_MOST_SHOWN], shown[_MOST_SHOWN:])
+    )
+    if len(shown) <= _MOST_SHOWN:
+        return first
+    rest = counted(len(shown) - _MOST_SHOWN, "more view", "more views")
+    return f"{first}<details><summary>{rest}</summary>{more}</details>"
 
 
 def _view(view: SeriesView, series: CalibrationSeries, scale: Enlarged) -> str:

@@ -19,10 +19,10 @@ from phone_host.diagnostics.run_snapshot import TIMELESS, RunSnapshot, unused
 from phone_host.diagnostics.throughput import Regime, budget_lines, figures, judge, missed_words
 from phone_host.model import Processed, Side
 from phone_host.report.budget_report import budget_tables
-from phone_host.report.cut_words import cut_sentence
 from phone_host.report.depth_data import density, photograph
 from phone_host.report.depth_view import cloud_view, depth_view
 from phone_host.report.drift_report import drift_table
+from phone_host.report.match_words import cut_sentence
 from phone_host.report.page_frame import section
 from phone_host.report.page_links import FileLink
 from phone_host.report.report_page import Figure, Headline, PageData, Picture, Table, delay_series, page

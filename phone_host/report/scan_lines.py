@@ -5,8 +5,7 @@ from typing import Final
 
 from common.imagesize.head import size_text
 from common.words import counted, distance_text, two_digits
-from phone_host.report.mat_figures import MatFigures
-from phone_host.report.scan_report import ScanReport, scan_verdict
+from phone_host.report.scan_report import MatFigures, ScanReport, scan_verdict
 
 _MOST_LINES: Final = 8
 

@@ -11,9 +11,8 @@ from common.versions import REPORT_FORMAT
 from phone_host.output.json_text import json_number
 from phone_host.report.drift_report import stills_drift_values
 from phone_host.report.match_words import corrected_values
-from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport
+from phone_host.report.stereo_report import ALWAYS, FailedPair, PairReport, SetReport, pair_verdict, set_verdict
 from phone_host.report.stereo_trust import trust_values
-from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 
 def pair_json(report: PairReport) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import math
 from common.imagesize.head import size_text
 from common.words import counted, distance_text
 from phone_host.diagnostics.headline import pixels_text
-from phone_host.report.cut_words import share_text
+from phone_host.report.match_words import share_text
 from phone_host.report.stereo_report import (
     ALWAYS,
     FailedPair,
@@ -13,10 +13,11 @@ from phone_host.report.stereo_report import (
     SetReport,
     SharedRemark,
     depth_png_words,
+    pair_verdict,
+    set_verdict,
     shared_remarks,
     told_names,
 )
-from phone_host.report.stereo_verdict import pair_verdict, set_verdict
 
 
 def pair_lines(report: PairReport, out: str) -> list[str]:

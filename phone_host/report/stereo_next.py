@@ -9,8 +9,7 @@ from phone_host.diagnostics.arrangement import EXCHANGE, tries_of
 from phone_host.output.axes import Axes
 from phone_host.report.page_links import NextCommand
 from phone_host.report.report_page import Headline
-from phone_host.report.stereo_report import PairReport
-from phone_host.report.stereo_verdict import pair_verdict
+from phone_host.report.stereo_report import PairReport, pair_verdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,8 +16,8 @@ from phone_host.diagnostics.headline import depth_error_m, pixels_text
 from phone_host.model import Processed
 from phone_host.output.preview import colour_disparity, colour_range_px
 from phone_host.report import depth_data
-from phone_host.report.cut_words import cut_rows, searched_from_m, share_text
 from phone_host.report.depth_view import THIN, cloud_view, depth_view
+from phone_host.report.match_words import cut_rows, searched_from_m, share_text
 from phone_host.report.page_frame import document, section, table
 from phone_host.report.page_links import FileLink, NextCommand, address, files_section, list_section, next_section
 from phone_host.report.page_script import Script

@@ -15,8 +15,7 @@ from phone_host.diagnostics.run_rules import concerns, history
 from phone_host.diagnostics.run_snapshot import RunSnapshot, unused
 from phone_host.diagnostics.throughput import budget_lines, figures, judge, missed_words
 from phone_host.model import DepthAccount, TimeOffset
-from phone_host.report.cut_words import cut_sentence
-from phone_host.report.match_words import run_corrected_words
+from phone_host.report.match_words import cut_sentence, run_corrected_words
 from phone_host.sync.phase import Alignment, Phase
 
 _MS: Final = 1e6

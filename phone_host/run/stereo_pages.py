@@ -17,8 +17,15 @@ from phone_host.report.stereo_page import (
     stereo_index,
     stereo_page,
 )
-from phone_host.report.stereo_report import FailedPair, PairReport, SetReport, depth_png_words, distinct_names
-from phone_host.report.stereo_verdict import pair_verdict, set_verdict
+from phone_host.report.stereo_report import (
+    FailedPair,
+    PairReport,
+    SetReport,
+    depth_png_words,
+    distinct_names,
+    pair_verdict,
+    set_verdict,
+)
 
 _WORDS: Final = {
     "cloud.ply": "coloured points in metres: {axes}; opens in MeshLab, CloudCompare and Blender",

@@ -13,9 +13,8 @@ from phone_host.diagnostics.headline import answer
 from phone_host.diagnostics.image_rules import image_doubts, median_figures
 from phone_host.diagnostics.run_rules import no_depth
 from phone_host.model import Drift, Processed
-from phone_host.report.cut_words import searched_from_m
 from phone_host.report.depth_data import density
-from phone_host.report.match_words import corrected_words
+from phone_host.report.match_words import corrected_words, searched_from_m
 from phone_host.report.stereo_report import distinct_names
 from phone_host.report.stereo_trust import PairTrust
 from phone_host.stereo.core import StereoCore

@@ -15,7 +15,7 @@ from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RecordingAccount, RunSnapshot, unused
 from phone_host.model import DepthAccount, Unwritten
 from phone_host.output.json_text import json_number, json_text
-from phone_host.report.cut_words import cut_sentence
+from phone_host.report.match_words import cut_sentence
 from phone_host.report.run_json import concern_values, problem_values, recording_values
 from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
 

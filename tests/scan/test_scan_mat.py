@@ -22,7 +22,7 @@ from phone_host.output.meshes.formats import read_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.rig_yaml import write_rig
-from phone_host.report.mat_figures import mat_figures
+from phone_host.report.scan_report import mat_figures
 from phone_host.scan.box import Box
 from phone_host.scan.factory import scan_for
 from phone_host.scan.mat import ABOVE_M, USUAL_MAT, MatCorners, mat_corners, parse_mat

@@ -13,7 +13,7 @@ import pytest
 from common.words import distance_text
 from phone_host.model import CutCounts, Epipolar, Search
 from phone_host.report import depth_data
-from phone_host.report.cut_words import cut_rows, cut_sentence
+from phone_host.report.match_words import cut_rows, cut_sentence
 from phone_host.report.page_frame import document
 from phone_host.report.page_links import FileLink, NextCommand
 from phone_host.report.page_script import Script, script

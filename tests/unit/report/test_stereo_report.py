@@ -20,9 +20,9 @@ from phone_host.report.stereo_report import (
     FailedPair,
     PairReport,
     SetReport,
+    set_verdict,
 )
 from phone_host.report.stereo_trust import PairTrust
-from phone_host.report.stereo_verdict import set_verdict
 from phone_host.run.stereo_remarks import files_remarks
 from phone_host.stereo.view_files import ViewFiles
 

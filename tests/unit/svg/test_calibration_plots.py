@@ -12,10 +12,10 @@ from phone_host.calibration.solve.view_turns import view_turns
 from phone_host.calibration.target.pairs import Reason, Rejected
 from phone_host.calibration.target.rectified_view import fullest, rectified_view
 from phone_host.calibration.target.small_picture import small_jpeg, small_size
+from phone_host.report.calibration_space import Shape, in_space, seen_from
 from phone_host.svg.plot_arrows import enlarged
 from phone_host.svg.plot_maps import TiltedBoard, coverage_map, tile_views, tilt_disc
 from phone_host.svg.plot_marks import Course, over_views
-from phone_host.svg.plot_rig import Shape, in_space, seen_from
 from tests.support.boards import BOARD
 from tests.support.calibration_series import calibration, pairs, taken, turned
 from tests.support.html import Page
