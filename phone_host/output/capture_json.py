@@ -60,10 +60,7 @@ def capture_text(report: CaptureReport) -> str:
 
 
 def read_capture(path: Path) -> CaptureReport | None:
-    """Read capture.json and check it.
-
-    Returns:
-        The report; None: there is no such file.
+    """Read capture.json and check it: the report; None: there is no such file.
 
     Raises:
         DataError: it is not valid, or of a newer format.

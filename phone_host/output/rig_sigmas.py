@@ -40,10 +40,7 @@ def write_sigmas(storage: cv2.FileStorage, rig: Rig) -> None:
 
 
 def read_covariance(node: cv2.FileNode, problem: Problem) -> NDArray[np.float64]:
-    """Read the covariance and check it.
-
-    Returns:
-        (30, 30); NaN if the file has none.
+    """Read the covariance and check it: (30, 30); NaN if the file has none.
 
     Raises:
         DataError: it is none.

@@ -65,10 +65,7 @@ def write_views(storage: cv2.FileStorage, views: RigViews) -> None:
 
 
 def read_views(storage: cv2.FileStorage, problem: Problem) -> RigViews | None:
-    """Read the views, and check them.
-
-    Returns:
-        The views; None if the file has none.
+    """Read the views, and check them: the views; None if the file has none.
 
     Raises:
         DataError: they are not valid.

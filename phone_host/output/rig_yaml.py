@@ -142,10 +142,7 @@ def read_rig(path: Path, content: bytes | None = None) -> Rig:
 
 
 def read_rig_views(path: Path) -> RigViews | None:
-    """Read what a rig was computed from.
-
-    Returns:
-        The views; None if the file has none.
+    """Read what a rig was computed from: the views; None if the file has none.
 
     Raises:
         DataError: the views are not valid; names file and key.

@@ -33,11 +33,7 @@ _DEPTH_M: Final = 1.0
 
 
 def calibration_page(series: CalibrationSeries) -> str:
-    """Make the page.
-
-    Returns:
-        An HTML document.
-    """
+    """Make the page: an HTML document."""
     found = series.found
     parts = [
         heading(_TITLE, _subtitle(series), _COLOURS[series.verdict], verdict_words(series)),

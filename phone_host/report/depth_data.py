@@ -82,11 +82,7 @@ def depth_picture(depth: NDArray[np.float32], near_m: float, far_m: float) -> Im
 
 
 def reduced(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Leave out rows and columns until a picture of the values is small enough.
-
-    Args:
-        values: (H, W) float32.
-    """
+    """Leave out rows and columns until a picture of the values is small enough; `values`: (H, W) float32."""
     height, width = values.shape
     size = _small_size(width, height)
     if size == (width, height):

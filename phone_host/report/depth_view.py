@@ -90,11 +90,7 @@ def depth_view(processed: Processed, captions: tuple[str, str]) -> str:
 
 
 def cloud_view(processed: Processed) -> str:
-    """Make the cloud that can be turned.
-
-    Returns:
-        HTML; empty if there is no point.
-    """
+    """Make the cloud that can be turned: HTML; empty if there is no point."""
     if processed.cloud is None or processed.geometry is None:
         return ""
     assert processed.disparity is not None

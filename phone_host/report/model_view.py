@@ -45,11 +45,7 @@ class ShownModel:
 
 
 def model_view(shown: ShownModel, file: str) -> str:
-    """Make the model that can be turned.
-
-    Returns:
-        HTML; empty if there is no triangle.
-    """
+    """Make the model that can be turned: HTML; empty if there is no triangle."""
     total = len(shown.mesh.triangles)
     if not total:
         return ""

@@ -47,11 +47,7 @@ _LEAST_OFFSET_MM, _LEAST_SCATTER_PX = 0.5, 0.1  # smaller differences are not wo
 
 
 def quality_page(report: QualityReport) -> str:
-    """Make the page.
-
-    Returns:
-        An HTML document.
-    """
+    """Make the page: an HTML document."""
     verdict, sentence = quality_verdict(report)
     count = len(report.pairs)
     remarks = [remark.text for remark in report.remarks]

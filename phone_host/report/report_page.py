@@ -236,10 +236,7 @@ def delay_series(
 
 
 def page(data: PageData) -> str:
-    """Make the whole page.
-
-    Returns:
-        An HTML document.
+    """Make the whole page: an HTML document.
 
     Raises:
         DataError: a picture is neither PNG nor JPEG.

@@ -41,11 +41,7 @@ _SHARES: Final = (
 
 
 def scan_page(report: ScanReport, shown: ShownModel, commands: tuple[NextCommand, ...] = ()) -> str:
-    """Make the page.
-
-    Returns:
-        An HTML document.
-    """
+    """Make the page: an HTML document."""
     verdict, sentence = scan_verdict(report)
     view = model_view(shown, MODEL)
     remarks = [

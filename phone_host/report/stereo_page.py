@@ -108,11 +108,7 @@ class StereoIndexData:
 
 
 def stereo_page(data: StereoPageData) -> str:
-    """Make the page of one result.
-
-    Returns:
-        An HTML document.
-    """
+    """Make the page of one result: an HTML document."""
     back = f'<p class="sub"><a href="{address(data.back)}">all pairs</a></p>' if data.back else ""
     cloud = cloud_view(data.processed)
     shown = "" if data.processed.disparity is None else depth_view(data.processed, data.captions)
@@ -132,11 +128,7 @@ def stereo_page(data: StereoPageData) -> str:
 
 
 def stereo_index(data: StereoIndexData) -> str:
-    """Make the page of several pairs; each picture leads to its pair's page.
-
-    Returns:
-        An HTML document.
-    """
+    """Make the page of several pairs; each picture leads to its pair's page: an HTML document."""
     cards = "".join(_entry(pair) for pair in data.pairs)
     parts = [
         heading(data.title, data.subtitle, data.verdict, data.sentence),

@@ -39,11 +39,7 @@ def duration_text(ns: float) -> str:
 
 
 def ticks(low: float, high: float, count: int) -> list[float]:
-    """Choose round numbers (1, 2 or 5 times a power of ten apart) inside an interval.
-
-    Returns:
-        The numbers, ascending; never more than `count` + 2.
-    """
+    """Choose round numbers (1, 2 or 5 times a power of ten apart) inside an interval: the numbers, ascending; never more than `count` + 2."""
     rough = (high - low) / max(1, count)
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= rough * 0.999)

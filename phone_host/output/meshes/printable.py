@@ -142,11 +142,7 @@ _EDGES: Final = {
 
 
 def volume_mm3(corners: Points) -> float:
-    """Return what a closed mesh encloses; below zero if it is inside out.
-
-    Args:
-        corners: (T, 3, 3), mm.
-    """
+    """Return what a closed mesh encloses; below zero if it is inside out; `corners`: (T, 3, 3), mm."""
     middle = corners.reshape(-1, 3).mean(axis=0)
     a, b, c = np.moveaxis(corners - middle, 1, 0)
     return float((a * np.cross(b, c)).sum() / 6)

@@ -89,10 +89,7 @@ def rotation_of(node: Node, matrix: Matrix) -> Matrix:
 
 
 def rigid_of(node: Node) -> tuple[Matrix, Matrix]:
-    """Read a 4x4 matrix of a rotation and a translation.
-
-    Returns:
-        (3, 3) rotation, (3,) translation in the file's unit.
+    """Read a 4x4 matrix of a rotation and a translation: (3, 3) rotation, (3,) translation in the file's unit.
 
     Raises:
         DataError: it is no such matrix.
