@@ -14,8 +14,7 @@ from common.versions import RIG_FORMAT
 from common.words import counted
 from phone_host.model import CameraModel, TimeOffset, Verdict
 from phone_host.output.rig_agreement import KeptRectification
-from phone_host.output.rig_cameras import read_camera
-from phone_host.output.rig_lenses import known_lens, require_count, usual_lens
+from phone_host.output.rig_cameras import known_lens, read_camera, require_count, usual_lens
 from phone_host.output.rig_sigmas import read_covariance
 from phone_host.output.rig_views import KEY as VIEWS
 from phone_host.output.rig_views import RigViews, read_views

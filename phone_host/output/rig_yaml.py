@@ -21,8 +21,7 @@ from common.versions import RIG_FORMAT
 from phone_host.model import Rectification, Rig, Side, TimeOffset
 from phone_host.output.atomic import write_text
 from phone_host.output.rig_agreement import require_agreement, require_own_focal
-from phone_host.output.rig_cameras import write_camera
-from phone_host.output.rig_lenses import lens_of
+from phone_host.output.rig_cameras import lens_of, write_camera
 from phone_host.output.rig_reader import RigReader
 from phone_host.output.rig_sigmas import write_sigmas
 from phone_host.output.rig_views import RigViews, write_views
