@@ -209,12 +209,7 @@ def _finished(host: Host, ends: Ends, seconds: float, stop: Callable[[], bool]) 
 
 
 def after_warm_up(ledgers: Sequence[PairLedger]) -> tuple[tuple[PairLedger, ...], float]:
-    """Leave out the pairs of the first second.
-
-    Returns:
-        The pairs done later, and the time from the last pair of the warm-up to the last of them, s: as many intervals
-        as pairs.
-    """
+    """Leave out the pairs of the first second: the pairs done later, and the time from the last pair of the warm-up to the last of them, s: as many intervals as pairs."""
     if not ledgers:
         return (), 0.0
     end_ns = ledgers[0].done_ns + round(WARM_UP_S * 1e9)
