@@ -5,7 +5,7 @@ that lie to each other as they should not. Figures behind the limits: `tests/ben
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -64,32 +64,25 @@ _BEHIND_SHARE: Final = 0.05
 _REMEDY: Final = "give the calib.txt that was published with these images"
 
 
-def off_middle(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say that the principal point is that of other images; empty if it lies where theirs can lie."""
+def _off_middle(evidence: Evidence) -> Iterator[Diagnostic]:
+    """Say that the principal point lies where that of other images lies."""
     seen = evidence.off_middle
-    if seen is None:
-        return ()
-    return (
-        diagnose(
+    if seen is not None:
+        yield diagnose(
             Code.GEOMETRY,
             f"calib.txt or --center may belong to other images: the principal point {seen.cx_px:.0f},{seen.cy_px:.0f}"
             f" lies far from the middle of {seen.width_px}x{seen.height_px} px, and metres are wrong then",
             _REMEDY,
-        ),
-    )
+        )
 
 
-def behind(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say that doffs is that of other images; empty if hardly a point lies behind infinity."""
-    if not evidence.behind_share > _BEHIND_SHARE:
-        return ()
-    return (
-        diagnose(
+def _behind(evidence: Evidence) -> Iterator[Diagnostic]:
+    if evidence.behind_share > _BEHIND_SHARE:
+        yield diagnose(
             Code.GEOMETRY,
             f"{evidence.behind_share:.0%} of the points would lie at infinity or behind it: doffs may be that of other images",
             f"{_REMEDY}, or --doffs: cx of the right camera minus cx of the left one, px",
-        ),
-    )
+        )
 
 
 _FLAT: Final = 2.0
@@ -114,69 +107,63 @@ _BLURRED_BESIDE_PX: Final = 1.5
 """Sharp images measure 0.8 to 1.3 px at up to 640 px of width, and 1.8 px if nothing in the scene has a sharp edge."""
 
 
-def covered_doubts(left: Exposure, right: Exposure) -> tuple[Diagnostic, ...]:
-    """Say which camera sees nothing at all; empty if both see something."""
-    blind = [
-        name
-        for name, here, there in (("left", left, right), ("right", right, left))
-        if here.structure < _FLAT and (_is_dark(here) or there.structure > max(_FLAT_RATIO * here.structure, _FLAT))
-    ]
-    if not blind:
-        return ()
-    camera_sees = _cameras(blind)
-    return (
-        diagnose(Code.COVERED, f"{camera_sees} no scene at all", "take off the lens cap, the shutter or the finger"),
-    )
+def _where(left: Exposure, right: Exposure, is_so: Callable[[Exposure, Exposure], bool]) -> dict[str, Exposure]:
+    """Return the cameras for whose image, beside the other one, something holds."""
+    both = {"left": (left, right), "right": (right, left)}
+    return {name: here for name, (here, there) in both.items() if is_so(here, there)}
 
 
-def _cameras(names: list[str]) -> str:
-    return "both cameras see" if len(names) == 2 else f"the {names[0]} camera sees"
+def _cameras(names: Collection[str]) -> str:
+    return "both cameras see" if len(names) == 2 else f"the {next(iter(names))} camera sees"
 
 
 def _is_dark(exposure: Exposure) -> bool:
     return exposure.mean_level < _DARK_MEAN and exposure.bright_level < _DARK_BRIGHT
 
 
-def dark_doubts(left: Exposure, right: Exposure) -> tuple[Diagnostic, ...]:
-    """Say which camera sees almost nothing because it is too dark; empty if neither."""
-    dark = [name for name, exposure in (("left", left), ("right", right)) if _is_dark(exposure)]
-    if not dark:
-        return ()
-    level = min(left.mean_level, right.mean_level)
-    camera_sees = _cameras(dark)
-    return (
-        diagnose(
+def _is_blind(here: Exposure, there: Exposure) -> bool:
+    stands_out = there.structure > max(_FLAT_RATIO * here.structure, _FLAT)
+    return here.structure < _FLAT and (_is_dark(here) or stands_out)
+
+
+def _is_blurred(here: Exposure, there: Exposure) -> bool:
+    beside = here.blur_px > _BLURRED_BESIDE_PX and here.blur_px > _BLURRED_RATIO * there.blur_px
+    return here.blur_px > _BLURRED_PX or beside
+
+
+def _covered(left: Exposure, right: Exposure) -> Iterator[Diagnostic]:
+    if blind := _where(left, right, _is_blind):
+        camera_sees = _cameras(blind)
+        yield diagnose(
+            Code.COVERED, f"{camera_sees} no scene at all", "take off the lens cap, the shutter or the finger"
+        )
+
+
+def _dark(left: Exposure, right: Exposure) -> Iterator[Diagnostic]:
+    if dark := _where(left, right, lambda here, _: _is_dark(here)):
+        level = min(left.mean_level, right.mean_level)
+        camera_sees = _cameras(dark)
+        yield diagnose(
             Code.DARK,
             f"{camera_sees} almost nothing because it is too dark (mean level {level:.0f} of 255)",
             "switch on a light, or give the camera a longer exposure",
-        ),
-    )
+        )
 
 
-def is_plain(left: Exposure, right: Exposure) -> bool:
-    """Tell whether both images show nothing but a plain surface: what is found in them is noise."""
-    return max(left.structure, right.structure) < _PLAIN
-
-
-def unfocused_doubts(left: Exposure, right: Exposure) -> tuple[Diagnostic, ...]:
-    """Say which image has no sharp edges; empty if both have."""
-    blurred = [
-        (name, here.blur_px)
-        for name, here, there in (("left", left, right), ("right", right, left))
-        if here.blur_px > _BLURRED_PX
-        or (here.blur_px > _BLURRED_BESIDE_PX and here.blur_px > _BLURRED_RATIO * there.blur_px)
-    ]
-    if not blurred:
-        return ()
-    width = max(blur for _, blur in blurred)
-    camera_sees = _cameras([name for name, _ in blurred])
-    return (
-        diagnose(
+def _unfocused(left: Exposure, right: Exposure) -> Iterator[Diagnostic]:
+    if blurred := _where(left, right, _is_blurred):
+        width = max(each.blur_px for each in blurred.values())
+        camera_sees = _cameras(blurred)
+        yield diagnose(
             Code.UNFOCUSED,
             f"{camera_sees} blurred edges ({width:.1f} px)",
             "clean and focus the lens, and switch its autofocus off before you calibrate",
-        ),
-    )
+        )
+
+
+def _is_plain(left: Exposure, right: Exposure) -> bool:
+    """Tell whether both images show nothing but a plain surface: what is found in them is noise."""
+    return max(left.structure, right.structure) < _PLAIN
 
 
 _BEYOND_SHARE: Final = 0.05
@@ -196,27 +183,25 @@ _FEW: Final = 24
 """A fence before a wall: half of the patches repeat, and fewer features agree with anything. Chessboards have 80 and more."""
 
 
-def is_pattern(evidence: Evidence) -> bool:
+def _is_pattern(evidence: Evidence) -> bool:
     """Tell whether so much of what the images show repeats that matched features prove nothing."""
     most = max((item.features for item in evidence.supports), default=0)
     return evidence.ambiguous_share > _PATTERN_SHARE or (evidence.ambiguous_share > _HALF and most < _FEW)
 
 
-def too_short(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say how much of the scene is nearer than was searched; empty if hardly any."""
+def _too_short(evidence: Evidence) -> Iterator[Diagnostic]:
+    """Say how much of the scene is nearer than was searched."""
     share = evidence.beyond_share
     if not share > _BEYOND_SHARE:
-        return ()
+        return
     remedy = f"give --disparities {evidence.enough_disparities}"
     if not math.isnan(evidence.enough_from_m):
         remedy = f"give --near {_rounded_down(evidence.enough_from_m)}m without --disparities, or --disparities {evidence.enough_disparities}"
-    return (
-        diagnose(
-            Code.SEARCH_TOO_SHORT,
-            f"{share:.0%} of the scene is nearer than was searched, and what is nearer gets a wrong depth",
-            remedy,
-            severity=Severity.FAIL if share > _MOSTLY_BEYOND else None,
-        ),
+    yield diagnose(
+        Code.SEARCH_TOO_SHORT,
+        f"{share:.0%} of the scene is nearer than was searched, and what is nearer gets a wrong depth",
+        remedy,
+        severity=Severity.FAIL if share > _MOSTLY_BEYOND else None,
     )
 
 
@@ -226,17 +211,13 @@ def _rounded_down(depth_m: float) -> str:
     return f"{math.floor(depth_m / step + 1e-9) * step:.6g}"
 
 
-def ambiguous(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    """Say that the pattern repeats within the search; empty if it does not."""
-    if not (evidence.ambiguous_share > _AMBIGUOUS_SHARE or is_pattern(evidence)):
-        return ()
-    return (
-        diagnose(
+def _ambiguous(evidence: Evidence) -> Iterator[Diagnostic]:
+    if evidence.ambiguous_share > _AMBIGUOUS_SHARE or _is_pattern(evidence):
+        yield diagnose(
             Code.AMBIGUOUS,
             f"the pattern repeats: {evidence.ambiguous_share:.0%} of the places looked at fit elsewhere as well, and depth may be off by whole repeats",
             "show a scene with irregular texture, or put irregular things before the pattern",
-        ),
-    )
+        )
 
 
 _STRANGERS: Final = 6
@@ -284,7 +265,7 @@ def image_doubts(evidence: Evidence, source: ImageSource = ImageSource.CAMERAS) 
         evidence: of the pair; without supports (an unrectified pair) only brightness is judged.
         source: where the images come from: remedies name the options of a camera's address, or those for files.
     """
-    foreign, seen = off_middle(evidence), _seen(evidence, source)
+    foreign, seen = tuple(_off_middle(evidence)), _seen(evidence, source)
     if foreign:  # doffs is then that of other images, too: one doubt of a kind is enough
         seen = (*foreign, *(item for item in seen if item.code != Code.GEOMETRY))
     return gravest_first(seen)
@@ -294,18 +275,18 @@ def _seen(evidence: Evidence, source: ImageSource) -> tuple[Diagnostic, ...]:
     """Say what the images themselves make doubtful."""
     support = {item.arrangement: item.features for item in evidence.supports}
     sees = max(support.values(), default=0) >= LEAST_SUPPORT
-    covered = () if sees else covered_doubts(evidence.left, evidence.right)
-    if covered:
+    exposures = evidence.left, evidence.right
+    if not sees and (covered := tuple(_covered(*exposures))):
         return covered
-    dark = dark_doubts(evidence.left, evidence.right)
+    dark = tuple(_dark(*exposures))
     if not support:
         return dark
-    light = (*dark, *unfocused_doubts(evidence.left, evidence.right))
-    if not sees and is_plain(evidence.left, evidence.right) and not evidence.density >= _STRANGERS_DENSITY:
+    light = (*dark, *_unfocused(*exposures))
+    if not sees and _is_plain(*exposures) and not evidence.density >= _STRANGERS_DENSITY:
         return light or (_NO_TEXTURE,)  # features of noise agree with nothing: that is no other scene
     mistake = arrangement_doubts(evidence, source)
-    if is_pattern(evidence) and not any(item.code == Code.SAME_IMAGE for item in mistake):
-        return *light, *ambiguous(evidence)  # features of a pattern match any repeat: mistakes they show are chance
+    if _is_pattern(evidence) and not any(item.code == Code.SAME_IMAGE for item in mistake):
+        return *light, *_ambiguous(evidence)  # features of a pattern match any repeat: mistakes they show are chance
     if not mistake and not light and _are_strangers(evidence, support):
         mistake = (_OTHER_SCENE,)
     return (*mistake, *light) if mistake else (*light, *_figures(evidence, support))
@@ -340,23 +321,20 @@ def _figures(evidence: Evidence, support: dict[Arrangement, int]) -> tuple[Diagn
     related, right = support[Arrangement.TILTED], support[Arrangement.RIGHT]
     is_tilted = related >= 2 * LEAST_SUPPORT and right < _TILTED_SHARE * related
     plain = figure_doubts(median_figures((evidence,)), is_tilted=is_tilted)
-    rows = tuple(item for item in plain if item.code == Code.VERTICAL_ERROR) or _skewed(evidence)
-    if not evidence.from_rig:
-        rows = tuple(replace(item, remedy=_NOT_RECTIFIED) for item in rows)
-    short, unsure = too_short(evidence), ambiguous(evidence)
-    sparse = (item for item in plain if item.code != Code.VERTICAL_ERROR)
-    cropped = (_CROPPED,) if evidence.is_cropped else ()
-    if evidence.is_cropped:
-        rows = tuple(replace(item, remedy=_CROPPED.remedy) for item in rows)
-    return (*behind(evidence), *rows, *short, *unsure, *(() if short or unsure else sparse), *cropped)
+    rows = [item for item in plain if item.code == Code.VERTICAL_ERROR] or list(_skewed(evidence))
+    if evidence.is_cropped or not evidence.from_rig:
+        mended = _CROPPED.remedy if evidence.is_cropped else _NOT_RECTIFIED
+        rows = [replace(item, remedy=mended) for item in rows]
+    unsure = (*_too_short(evidence), *_ambiguous(evidence))
+    sparse = () if unsure else (item for item in plain if item.code != Code.VERTICAL_ERROR)
+    return (*_behind(evidence), *rows, *unsure, *sparse, *((_CROPPED,) if evidence.is_cropped else ()))
 
 
-def _skewed(evidence: Evidence) -> tuple[Diagnostic, ...]:
-    if not evidence.skew_px > _MOST_SKEW_PX:
-        return ()
-    off_px = _EDGE_TO_EDGE * evidence.skew_px
-    sentence = f"the rows of the two images do not agree (one edge is off against the other by {off_px:.1f} px)"
-    return (diagnose(Code.VERTICAL_ERROR, sentence, _MOVED),)
+def _skewed(evidence: Evidence) -> Iterator[Diagnostic]:
+    if evidence.skew_px > _MOST_SKEW_PX:
+        off_px = _EDGE_TO_EDGE * evidence.skew_px
+        sentence = f"the rows of the two images do not agree (one edge is off against the other by {off_px:.1f} px)"
+        yield diagnose(Code.VERTICAL_ERROR, sentence, _MOVED)
 
 
 def _percent(share: float) -> str:
