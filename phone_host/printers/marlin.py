@@ -75,11 +75,9 @@ class MarlinSender:
         self._under_way: SentLine | None = None
         self._began_ns = self._last_sent_ns = now_ns
         self._refused_order = self._swallow_ok = self._is_deaf = self._is_first = self._is_doubted = False
-        self._awaited_ok_ns = 0
+        self._awaited_ok_ns, self._last_heard_ns = 0, now_ns
         self._again: list[int] = []
-        self._last_heard_ns = now_ns
-        self._urgent = b""
-        self._ended_there = ""
+        self._urgent, self._ended_there = b"", ""
         self._guard = Guard(self._options.inactivity_s)
         self.phase = Phase.OPENING
         self.done = self.resent = 0

@@ -7,7 +7,7 @@ Conservation: received = paired + orphaned(by reason) + held; paired = taken + d
 """
 
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import Final, assert_never
 
@@ -90,8 +90,7 @@ class PairQueue:
         self._meter: PhaseMeter | None = None
         self._newest: deque[BoardFrame] = deque(maxlen=_NEWEST)
         self._received = self._host_frames = self._paired = self._dropped = self._taken = 0
-        self._board_orphans: dict[str, int] = {}
-        self._host_orphans: dict[str, int] = {}
+        self._board_orphans, self._host_orphans = Counter[str](), Counter[str]()
         self._host_bytes = self._board_bytes = 0
         self._delay_ns = _LEAST_WAIT_NS
 
@@ -275,7 +274,7 @@ class PairQueue:
             self._board_alone += 1
             if number is not None and len(self._board_numbers) < MOST_NAMED:
                 self._board_numbers.append(number)
-            self._count(self._board_orphans, OrphanReason.NO_SUCH_NUMBER.value)
+            self._board_orphans[OrphanReason.NO_SUCH_NUMBER.value] += 1
 
     def _pass_over(self, passed: PassedOver) -> None:
         """Count images of this machine that are never shown, because no board image of their number came."""
@@ -285,7 +284,7 @@ class PairQueue:
             self._own_numbers += passed.numbers[: MOST_NAMED - len(self._own_numbers)]
             for reason, images in (OrphanReason.NO_SUCH_NUMBER, passed.alone), (OrphanReason.NO_PARTNER, passed.unsent):
                 if images:
-                    self._count(self._host_orphans, reason.value, images)
+                    self._host_orphans[reason.value] += images
 
     def own_image_missing(self) -> None:
         """The image that the host camera was asked for is spoiled. Its board frame finds no other partner."""
@@ -303,7 +302,7 @@ class PairQueue:
             assert self._pairing is not None
             self._received += 1
             if self._closed:
-                self._count(self._board_orphans, OrphanReason.STREAM_ENDED.value)
+                self._board_orphans[OrphanReason.STREAM_ENDED.value] += 1
                 return
             self.note_age(self._clock() - frame.marks.exposed_ns)  # includes the wait for an echo
             self._board_bytes += len(frame.message.payload)
@@ -319,7 +318,7 @@ class PairQueue:
         with self._changed:
             self._host_frames += 1
             if self._pairing is None or self._closed:
-                self._count(self._host_orphans, OrphanReason.STREAM_ENDED.value if self._closed else "no_board")
+                self._host_orphans[OrphanReason.STREAM_ENDED.value if self._closed else "no_board"] += 1
                 return
             now_ns = self._clock()
             if self._meter is not None:
@@ -386,10 +385,10 @@ class PairQueue:
                     self._changed.notify()
                 case BoardOrphan(frame, reason):
                     self._board_bytes -= len(frame.message.payload)
-                    self._count(self._board_orphans, reason.value)
+                    self._board_orphans[reason.value] += 1
                 case HostOrphan(own, reason):
                     self._host_bytes -= len(own.payload)
-                    self._count(self._host_orphans, reason.value)
+                    self._host_orphans[reason.value] += 1
                 case _:
                     assert_never(outcome)
 
@@ -398,7 +397,3 @@ class PairQueue:
         session, exposed_ns = frame.message.session, frame.marks.exposed_ns
         older = (f for f in self._newest if f.message.session == session and f.marks.exposed_ns < exposed_ns)
         return max(older, key=lambda f: f.marks.exposed_ns, default=None)
-
-    @staticmethod
-    def _count(account: dict[str, int], reason: str, frames: int = 1) -> None:
-        account[reason] = account.get(reason, 0) + frames

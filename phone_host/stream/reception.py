@@ -11,6 +11,7 @@ from typing import assert_never
 
 from common.errors import UnavailableError
 from common.program.logs import event
+from common.protocol import session
 from common.protocol.host_session import HostSession
 from common.protocol.message import (
     BoardHello,
@@ -20,25 +21,6 @@ from common.protocol.message import (
     Message,
     RefusalReason,
     Rung,
-)
-from common.protocol.session import (
-    Accepted,
-    Arrived,
-    ClockVoid,
-    Counted,
-    Echo,
-    LinkDown,
-    LinkUp,
-    LocksTold,
-    OtherBoard,
-    Outgoing,
-    Output,
-    Refused,
-    Stale,
-    StaleReason,
-    Stepped,
-    Unbelievable,
-    Vanished,
 )
 from phone_host.accounts.link_account import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
@@ -59,8 +41,9 @@ class Reception:
 
     Attributes:
         account: the links' account so far.
-        border: what decides whether frames are believed.
         tail_known: whether the board has told the last account of this session.
+        border: what decides whether frames are believed.
+        hello: the board's description of itself; None before the first contact.
         due_ns: when to call `tick` next even if nothing comes, ns; as of the last `tick`.
 
     Args:
@@ -71,19 +54,13 @@ class Reception:
     """
 
     def __init__(
-        self,
-        links: Sequence[LinkFacts],
-        host_id: str,
-        sink: FrameSink,
-        send: Callable[[Outgoing], None],
+        self, links: Sequence[LinkFacts], host_id: str, sink: FrameSink, send: Callable[[session.Outgoing], None]
     ) -> None:
-        self._links = tuple(links)
-        self._sink = sink
-        self._send = send
+        self._links, self._sink, self._send = tuple(links), sink, send
         self._session = HostSession(host_id, [link.dialled for link in links])
         self._choice = LinkChoice(len(links))
         self._boot_id = ""
-        self._hello: BoardHello | None = None
+        self.hello: BoardHello | None = None
         self._flow = Flow()
         self._streamed_over: int | None = None
         self._refusals = Refusals()
@@ -112,11 +89,6 @@ class Reception:
         return "" if link is None else self.account.links[link].name
 
     @property
-    def hello(self) -> BoardHello | None:
-        """The board's description of itself; None before the first contact."""
-        return self._hello
-
-    @property
     def locks(self) -> LockState | None:
         """How the board's camera is held, as it said in this session; None: it has not said."""
         return self._locks.state
@@ -141,7 +113,7 @@ class Reception:
         """
         if isinstance(message, FrameMessage):
             lost, link = self._session.take_frame(connection[0], message, now_ns), connection[0]
-            if isinstance(lost, StaleReason):
+            if isinstance(lost, session.StaleReason):
                 self.account.current.count_stale(lost)
             else:
                 self.accept_frame(message, lost, link, now_ns)
@@ -196,8 +168,8 @@ class Reception:
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
-        if self._hello is not None:
-            self.handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
+        if self.hello is not None:
+            self.handle(self._session.steer(later_ns % self.hello.camera.period_ns), now_ns)
 
     def hold(self, locks: Locks) -> None:
         """Have the board's camera held like this, in this session and every later one."""
@@ -237,14 +209,11 @@ class Reception:
             _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
 
     def _grant(self, now_ns: int) -> None:
-        if self._hello is None:
+        if self.hello is None:
             return
         if (frames := self._sink.room()) is None:
-            outstanding, round_trip_ns = (
-                self._session.outstanding,
-                self._paced_round_trip_ns() if self._is_paced else None,
-            )
-            frames = self._flow.credit(outstanding, self._hello.camera.period_ns, round_trip_ns)
+            round_trip_ns = self._paced_round_trip_ns() if self._is_paced else None
+            frames = self._flow.credit(self._session.outstanding, self.hello.camera.period_ns, round_trip_ns)
         if frames and self.border.takes_frames:  # without a clock, frames could not be paired
             self.handle(self._session.grant(frames), now_ns)
 
@@ -255,42 +224,42 @@ class Reception:
             return None
         return self.border.round_trip_ns(carrier) or 0
 
-    def handle(self, outputs: list[Output], now_ns: int) -> None:
+    def handle(self, outputs: list[session.Output], now_ns: int) -> None:
         """Do what the session says, save for frames: those come by a shorter way, see `receive`."""
         for output in outputs:
-            assert not isinstance(output, Arrived | Stale)
+            assert not isinstance(output, session.Arrived | session.Stale)
             match output:
-                case Outgoing():
+                case session.Outgoing():
                     self._send(output)
-                case Echo() | ClockVoid():
+                case session.Echo() | session.ClockVoid():
                     self._note_clock(output, now_ns)
-                case Accepted():
+                case session.Accepted():
                     self._begin(output, now_ns)
-                case LinkUp() | LinkDown() | OtherBoard():
+                case session.LinkUp() | session.LinkDown() | session.OtherBoard():
                     self._note_link(output, now_ns)
-                case Counted():
+                case session.Counted():
                     self._note_account(output, now_ns)
-                case LocksTold(state):
+                case session.LocksTold(state):
                     self._locks.told(state)
-                case Stepped(rung):
+                case session.Stepped(rung):
                     self._note_rung(rung)
-                case Refused() | Unbelievable():
+                case session.Refused() | session.Unbelievable():
                     self._note_refusal(output, now_ns)
-                case Vanished(orderly):
+                case session.Vanished(orderly):
                     self._note_gone(orderly=orderly, now_ns=now_ns)
                 case _:
                     assert_never(output)
 
-    def _note_clock(self, echo: Echo | ClockVoid, now_ns: int) -> None:
+    def _note_clock(self, echo: session.Echo | session.ClockVoid, now_ns: int) -> None:
         """Give an echo to the clock and pass the frames that it has proven; or restart the clock if it is void."""
-        if isinstance(echo, ClockVoid):
+        if isinstance(echo, session.ClockVoid):
             self.border.void("the board had not heard this host for a while")
             return
         for passed in self.border.learn(echo):
             self._pass(*passed)
         self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
 
-    def _note_account(self, counted: Counted, now_ns: int) -> None:
+    def _note_account(self, counted: session.Counted, now_ns: int) -> None:
         """Take note of the board's account of the present session."""
         self.tail_known |= counted.last  # an older account may still follow on the other lane
         account = self.account.current
@@ -299,12 +268,12 @@ class Reception:
         account.ended |= counted.ended
         self._choice.account(counted.counts.grabbed, now_ns, has_credit=self._session.outstanding > 0)
 
-    def _note_refusal(self, refused: Refused | Unbelievable, now_ns: int) -> None:
+    def _note_refusal(self, refused: session.Refused | session.Unbelievable, now_ns: int) -> None:
         """Note that a board refuses this host, or sends nonsense.
 
         If another link is up, the run goes on, so the refusal is logged once.
         """
-        if isinstance(refused, Unbelievable):
+        if isinstance(refused, session.Unbelievable):
             self.count_garbage(refused.problem)
             return
         refusal = BoardRefusal(refused.reason)
@@ -328,11 +297,11 @@ class Reception:
             tally.is_up = False
         _LOG.info(event("board_gone", session=self.account.current.session, orderly=orderly))
 
-    def _note_link(self, news: LinkUp | LinkDown | OtherBoard, now_ns: int) -> None:
+    def _note_link(self, news: session.LinkUp | session.LinkDown | session.OtherBoard, now_ns: int) -> None:
         """Take note of a link that came up, went down, or leads to a different board."""
         tally = self.account.links[news.link]
         match news:
-            case LinkUp(link, hello):
+            case session.LinkUp(link, hello):
                 tally.is_up = True
                 self._refusals.link_up(link)
                 if hello.boot_id != self._boot_id:
@@ -340,7 +309,7 @@ class Reception:
                     self.border.other_clock()
                 self._choice.up(link, now_ns)
                 _LOG.info(event("link_up", link=tally.name))
-            case LinkDown(link, stuck):
+            case session.LinkDown(link, stuck):
                 tally.is_up = stuck
                 tally.lost += 1
                 self.border.link_down(link)
@@ -348,8 +317,8 @@ class Reception:
                 if stuck:
                     self._choice.up(link, now_ns)
                 _LOG.info(event("link_down", link=tally.name, stuck=stuck))
-            case OtherBoard(link, hello):
-                ours = self._hello
+            case session.OtherBoard(link, hello):
+                ours = self.hello
                 names = " and ".join(tally.name for tally in self.account.links)
                 if tally.frames or tally.lost or ours is None:  # it was right once: somebody has moved a cable
                     _LOG.warning(event("other_board", link=tally.name, camera=hello.camera.name))
@@ -361,10 +330,10 @@ class Reception:
             case _:
                 assert_never(news)
 
-    def _begin(self, accepted: Accepted, now_ns: int) -> None:
+    def _begin(self, accepted: session.Accepted, now_ns: int) -> None:
         hello, link = accepted.hello, accepted.link
         self._refusals.accepted()
-        self._hello = hello
+        self.hello = hello
         self._flow = Flow()
         self.tail_known = False
         self._choice.carries(link, now_ns)
@@ -389,21 +358,13 @@ class Reception:
             return
         self.account.connects += 1
         camera, size = hello.camera.name, f"{hello.camera.width_px}x{hello.camera.height_px}"
-        _LOG.info(
-            event(
-                "board_found",
-                session=hello.session,
-                resumed=accepted.resumed,
-                link=tally.name,
-                camera=camera,
-                size=size,
-            )
-        )
+        came = {"session": hello.session, "resumed": accepted.resumed, "link": tally.name}
+        _LOG.info(event("board_found", **came, camera=camera, size=size))
 
     def _note_rung(self, rung: Rung) -> None:
         """Adopt the new rung of the board's camera."""
-        assert self._hello is not None
-        self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
+        assert self.hello is not None
+        self.hello = replace(self.hello, camera=replace(self.hello.camera, period_ns=rung.period_ns), rung=rung)
         self.account.current.rung = rung
         self._sink.change_period(rung.period_ns)
         fps = round(1e9 / rung.period_ns, 2)
@@ -416,8 +377,8 @@ class Reception:
         account.lost += lost
         tally.frames += 1
         tally.bytes += len(frame.payload)
-        assert self._hello is not None
-        arrival = Arrival(frame, link, account, self._hello.camera, now_ns)
+        assert self.hello is not None
+        arrival = Arrival(frame, link, account, self.hello.camera, now_ns)
         if (believed := self.border.admit(arrival)) is None:
             self._has_news = True
         else:
@@ -425,7 +386,7 @@ class Reception:
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
         """Pass a believed frame to the sink, if the sink wants it."""
-        assert self._hello is not None
+        assert self.hello is not None
         if (objection := self._sink.objection(frame)) is not None:
             self.account.current.disbelieved[objection] += 1
             return
@@ -433,9 +394,7 @@ class Reception:
         transit_ns = frame.received_ns - marks.sent_ns
         if self._is_choosing:
             self._choice.frame(link, transit_ns, frame.received_ns)
-        self._flow.arrived(
-            transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, frame.received_ns
-        )
+        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, self.hello.camera.period_ns, frame.received_ns)
         self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
         self.border.passed(message)
         self._sink.add_board(frame)
