@@ -1,19 +1,20 @@
 """board-agent doctor: everything that keeps a board from streaming, each with its remedy. Checks live in common/doctor."""
 
+import stat
 from pathlib import Path
 from typing import Final
 
-from board_agent.doctor.key_checks import check_keys
 from board_agent.doctor.link_probe import examine_link
 from board_agent.settings import BoardSettings, key_folder
 from common.diagnostic import Diagnostic
 from common.doctor import machine
 from common.doctor.access import Account
 from common.doctor.camera_probe import examine_camera
-from common.doctor.finding import fail
+from common.doctor.finding import fail, ok, warn
 from common.doctor.machine_checks import check_clocks, check_disk, check_power, check_usb_log
 from common.doctor.package_probe import missing_packages
 from common.doctor.unit_check import Unit, check_unit
+from common.errors import TandemError
 from common.keys import SERVICE_FOLDER, KeyFolder
 from common.link.factory import needs_keys, parse_link
 
@@ -71,3 +72,34 @@ def _examine_links(settings: BoardSettings, user: Account, unit: Unit, *, is_ser
         of_service = is_service and not settings.keys
         findings.append(check_keys(KeyFolder(SERVICE_FOLDER) if of_service else key_folder(settings.keys), user))
     return findings
+
+
+def check_keys(folder: KeyFolder, account: Account) -> Diagnostic:  # noqa: PLR0911 - one for each state of the folder
+    """Judge a board's key folder."""
+    path = folder.path
+    try:
+        if not path.exists():
+            return warn("keys", f"{path} is not there yet, so nobody is known", "start the agent, then pair a host")
+        # Key files are for their owner only, so whoever must read them must own them; root may read everything.
+        states = {item.name: item.lstat() for item in path.iterdir()}
+        owners = {name: state.st_uid for name, state in states.items() if stat.S_ISREG(state.st_mode)}
+        if folder.has_key:
+            folder.own()
+        peers = folder.peers()
+    except PermissionError:
+        return warn("keys", f"{path} may not be read", "ask again as root: sudo")
+    except OSError as error:
+        return fail("keys", f"{path} cannot be used ({error.strerror})", "name another folder with --keys")
+    except TandemError as error:
+        return fail("keys", error.problem, error.remedy)
+    foreign = sorted(name for name, uid in owners.items() if uid != account.uid)
+    if foreign and account.uid != 0:
+        problem = f"{', '.join(foreign)} in {path} may not be read by user {account.name}"
+        return fail("keys", problem, f"sudo chown -R {account.name}: {path}")
+    if not peers:
+        return warn(
+            "keys",
+            f"{path} knows no host yet",
+            "run phone-host pair on the host, and board-agent pair here: it shows the code",
+        )
+    return ok("keys", f"{path} knows {', '.join(peer.name for peer in peers)}")

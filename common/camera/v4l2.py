@@ -18,8 +18,8 @@ from common.camera.restart_timing import RestartTiming
 from common.camera.v4l2_controls import to_axis, to_locks
 from common.camera.v4l2_device import find_camera
 from common.camera.v4l2_formats import Wanted
-from common.camera.v4l2_rate import RateWatch
 from common.camera.v4l2_ring import RING_BUFFERS
+from common.camera.v4l2_stamps import RateMeter, rate_remedy
 from common.camera.v4l2_stream import Stream, V4l2Settings
 from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
@@ -368,3 +368,28 @@ class V4l2Camera:
             self._known_problem = ""
             self._life.opened(now_ns, stream.period_ns)
             self._note_back()
+
+
+class RateWatch:
+    """Remembers whether the rate was off, so that each change is told once."""
+
+    def __init__(self) -> None:
+        self._is_off = False
+
+    def watch(self, rate: RateMeter, nominal_ns: int, exposure_ns: int | None) -> None:
+        """Report once when the rate differs from the nominal one, and once when it no longer does.
+
+        Args:
+            rate: the measured rate.
+            nominal_ns: period that the camera was asked for, ns.
+            exposure_ns: exposure time now, ns; None: not known.
+        """
+        if rate.differs_from(nominal_ns) is self._is_off:
+            return
+        self._is_off = not self._is_off
+        period_ns = rate.period_ns or 1
+        figures = {"period_ms": round(period_ns / 1e6, 2), "nominal_ms": round(nominal_ns / 1e6, 2)}
+        if self._is_off:
+            _LOG.warning(event("rate_differs", **figures, remedy=rate_remedy(period_ns, nominal_ns, exposure_ns)))
+        else:
+            _LOG.info(event("rate_nominal", **figures))

@@ -6,6 +6,7 @@ described here is nothing.
 """
 
 import json
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +18,6 @@ from common.imagesize.jpeg import jpeg_head
 from common.orientation import UPRIGHT
 from common.plain_text import printable
 from common.protocol.wire_fields import MAX_SIZE_PX
-from phone_host.camera.browser_name import browser_name
 from phone_host.camera.browser_uri import BrowserSettings
 
 VERSION: Final = 1
@@ -344,3 +344,40 @@ def _time(value: object) -> float | None:
 
 def _text(values: Mapping[str, object]) -> str:
     return json.dumps(values, allow_nan=False)
+
+
+_NAMES: Final = (
+    # The first that fits: Edge and Samsung's browser call themselves Chrome, too, and Chrome calls itself Safari.
+    ("Edge", re.compile(r"Edg(?:A|iOS)?/(\d{1,4})")),
+    ("Samsung Internet", re.compile(r"SamsungBrowser/(\d{1,4})")),
+    ("Opera", re.compile(r"OPR/(\d{1,4})")),
+    ("Firefox", re.compile(r"(?:Firefox|FxiOS)/(\d{1,4})")),
+    ("Chrome", re.compile(r"(?:Chrome|CriOS)/(\d{1,4})")),
+    ("Safari", re.compile(r"Version/(\d{1,4})\S* (?:Mobile/\S+ )?Safari/")),
+)
+_SYSTEMS: Final = (
+    ("Android", "Android"),
+    ("iPhone", "iPhone"),
+    ("iPad", "iPad"),
+    ("Windows", "Windows"),
+    ("Macintosh", "macOS"),
+    ("CrOS", "ChromeOS"),
+    ("Linux", "Linux"),
+)
+
+
+def browser_name(agent: str) -> str:
+    """Return a browser's name, its main version and its system, such as "Chrome 141 on Android".
+
+    Browsers no longer tell the system's version nor the phone's name.
+
+    Args:
+        agent: its User-Agent.
+
+    Returns:
+        What is known of it; empty: nothing.
+    """
+    found = ((name, pattern.search(agent)) for name, pattern in _NAMES)
+    browser = next((f"{name} {match[1]}" for name, match in found if match is not None), "")
+    system = next((name for word, name in _SYSTEMS if word in agent), "")
+    return f"{browser} on {system}" if browser and system else browser or system

@@ -2,7 +2,7 @@
 
 import pytest
 
-from phone_host.camera.browser_name import browser_name
+from phone_host.camera.browser_wire import browser_name
 
 _WEBKIT = "AppleWebKit/537.36 (KHTML, like Gecko)"
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from board_agent.doctor.key_checks import check_keys
+from board_agent.doctor.board_doctor import check_keys
 from board_agent.doctor.link_checks import LinkReadings, check_link
 from common.camera.v4l2_formats import FormatOffer, Rates, Wanted
 from common.camera.v4l2_stamps import StampClock, rate_remedy
