@@ -33,12 +33,7 @@ class LinkReadings:
 
 
 def check_link(link: LinkReadings, service_pid: int) -> Diagnostic:  # noqa: PLR0911 - one for each state of a link
-    """Judge a link.
-
-    Args:
-        link: what was found out.
-        service_pid: main process of our own service; 0: it does not run.
-    """
+    """Judge a link."""
     port = link.uri.partition("?")[0].rpartition("/")[2]
     if link.terminals:
         unit = f"serial-getty@{port}" if any("getty" in holder.name for holder in link.terminals) else ""

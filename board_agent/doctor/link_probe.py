@@ -18,12 +18,6 @@ from common.link.factory import open_link, parse_link
 def examine_link(uri: str, account: Account, unit: Unit, *, listens_by_default: bool) -> list[Diagnostic]:
     """Check one link.
 
-    Args:
-        uri: the link.
-        account: the user who must open it.
-        unit: our own service, which may have it open.
-        listens_by_default: true on the board.
-
     Raises:
         SettingsError: the URI makes no sense.
     """

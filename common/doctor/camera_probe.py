@@ -45,11 +45,6 @@ _LONGEST_NS: Final = 6_000_000_000
 def examine_camera(uri: str, account: Account, unit: Unit) -> list[Diagnostic]:
     """Check a camera from its node to its frames.
 
-    Args:
-        uri: the camera.
-        account: the user who must open it.
-        unit: our own service, which may have it open.
-
     Returns:
         The findings, without those that depend on a failed one.
 

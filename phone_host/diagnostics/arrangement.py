@@ -228,13 +228,7 @@ def mirrored_further(present: Orientation) -> Orientation:
 def with_final_options(
     concern: Diagnostic, present: Sequence[Orientation], source: ImageSource = ImageSource.CAMERAS
 ) -> Diagnostic:
-    """Return a concern whose remedy names the options to be given in the end, if it is mended by turning or mirroring.
-
-    Args:
-        concern: any concern.
-        present: the orientations that the left and the right camera have been given.
-        source: where the images come from, and so how the user states them.
-    """
+    """Return a concern whose remedy names the options to be given in the end, if it is mended by turning or mirroring."""
     seen = concern.evidence
     if not isinstance(seen, Misplaced) or seen.arrangement not in _TURNS:
         return concern

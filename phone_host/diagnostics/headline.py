@@ -98,11 +98,7 @@ def answer(
 
 
 def pixels_text(cut: CutCounts | None) -> str:
-    """Say of which pixels a density is the share: `of the pixels`, `of the pixels inside the crop`.
-
-    Args:
-        cut: the counts; None: not counted.
-    """
+    """Say of which pixels a density is the share: `of the pixels`, `of the pixels inside the crop`."""
     return "of the pixels inside the crop" if cut is not None and cut.outside else "of the pixels"
 
 

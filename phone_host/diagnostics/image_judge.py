@@ -127,13 +127,7 @@ def past_seconds(history: Sequence[Episode]) -> float:
 
 
 def told_past(history: Sequence[Episode], pairs: int, save_every: int) -> list[tuple[Diagnostic, str]]:
-    """Return the gravest of what stood for a while and has gone, each with one line that says so.
-
-    Args:
-        history: of the run.
-        pairs: number of processed pairs.
-        save_every: every Nth pair was saved, beginning with the first; 0: none.
-    """
+    """Return the gravest of what stood for a while and has gone, each with one line that says so."""
     return [(item.concern, _line(item, pairs, save_every)) for item in past(history)[:_MOST_TOLD]]
 
 

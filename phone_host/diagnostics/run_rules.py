@@ -53,13 +53,6 @@ def require_camera(
 ) -> None:
     """Check that a camera is the rig's and is mounted as it was.
 
-    Args:
-        side: which of the rig's two cameras it is.
-        whose: whose camera it is, for example `the board's camera`.
-        rig: the camera as the rig states it.
-        present: the camera that is there.
-        other: the rig's camera on the other side; unknown if the rig does not state it.
-
     Raises:
         DataError: it is another camera, or has another orientation; names both and what to do.
     """
@@ -208,13 +201,7 @@ _AT_ZERO: Final = diagnose(
 
 
 def no_depth(cut: CutCounts | None, limits: DepthLimits | None, others: tuple[Diagnostic, ...] = ()) -> Diagnostic:
-    """Return the doubt about pairs of which no pixel has depth.
-
-    Args:
-        cut: what became of their pixels; None: not counted.
-        limits: to which their clouds were cut; None without a cloud.
-        others: the other doubts about them: one of them may say why.
-    """
+    """Return the doubt about pairs of which no pixel has depth."""
     cause = [concern for concern in others if concern.code in _CAUSES]
     if cause:
         return diagnose(Code.NO_DEPTH, f"{_UNMATCHED.message}: {cause[0].message}", cause[0].remedy)

@@ -310,11 +310,7 @@ _WHY: Final = {
 
 
 def budget_lines(account: BudgetAccount | None) -> list[str]:
-    """Say what was chosen, how well the budget was held, and what is lost; nothing without a budget.
-
-    Args:
-        account: of the run; None: it has no budget, or no pair yet.
-    """
+    """Say what was chosen, how well the budget was held, and what is lost; nothing without a budget."""
     if account is None:
         return []
     took = "" if math.isnan(account.processing_ns) else f", the newest pairs took {account.processing_ns / _MS:.1f} ms"

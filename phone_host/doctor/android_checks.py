@@ -35,11 +35,7 @@ def check_phone(phone: Phone) -> Diagnostic:
 
 
 def check_camera(uri: str = "") -> Diagnostic:
-    """Say which camera there is instead of the kernel's, which Android shows to no app.
-
-    Args:
-        uri: the V4L2 camera that is asked for; empty: none.
-    """
+    """Say which camera there is instead of the kernel's, which Android shows to no app."""
     stead = "the page's browser is the camera, or an MJPEG app (--camera http:)"
     if uri:
         return fail("camera", f"{uri}: Android shows no camera to Termux", stead)

@@ -46,12 +46,7 @@ def source_of(camera: Camera) -> CaptureSource:
 
 
 def lens_for(rig: Rig | None, source: CaptureSource) -> CameraModel | None:
-    """Return the calibrated lens of the host's camera for a size of images; None: it is not known for that size.
-
-    Args:
-        rig: the calibration; None: there is none.
-        source: the camera.
-    """
+    """Return the calibrated lens of the host's camera for a size of images; None: it is not known for that size."""
     if rig is None:
         return None
     side = rig.board_side.other

@@ -151,24 +151,14 @@ def check_board(board: BoardReadings) -> Diagnostic:  # noqa: PLR0911 - one retu
 
 
 def check_ports(ports: tuple[str, ...], problem: str) -> Diagnostic:
-    """List the serial ports.
-
-    Args:
-        ports: names of the ports, with what is attached.
-        problem: why they could not be listed; empty if they could.
-    """
+    """List the serial ports."""
     if problem:
         return missing_package("serial", f"no serial links ({problem})")
     return ok("serial", ", ".join(ports) if ports else "no USB or Bluetooth serial port is there now")
 
 
 def check_out(folder: str, obstacle: str) -> list[Diagnostic]:
-    """Judge whether results can be written to a folder. If so, return nothing: the disk's finding names the folder.
-
-    Args:
-        folder: as the user named it.
-        obstacle: why nothing can be written there; empty: it can.
-    """
+    """Judge whether results can be written to a folder. If so, return nothing: the disk's finding names the folder."""
     if not obstacle:
         return []
     return [fail("out", f"{folder} cannot be written to ({obstacle})", "choose another folder with --out")]

@@ -76,10 +76,6 @@ def ask_board(uri: str, wait_s: float, keys: KeyFolder) -> BoardReadings:
 def read_rig_readings(calibration: str, camera: str) -> RigReadings:
     """Read a rig and compute its rectification.
 
-    Args:
-        calibration: rig.yaml.
-        camera: URI of the host camera; empty: none given.
-
     Raises:
         SettingsError: the URI is invalid.
     """

@@ -87,12 +87,6 @@ def await_board(
 ) -> bool:
     """Wait until a board has delivered what the caller needs.
 
-    Args:
-        receiver: a started receiver.
-        patience: how long to wait.
-        ready: whether the board has delivered; called several times a second.
-        stop: whether to end the wait; called as often.
-
     Returns:
         True if the board has delivered, False if `stop` ended the wait.
 

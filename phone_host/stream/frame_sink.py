@@ -14,11 +14,7 @@ class FrameSink(Protocol):
     """Takes the frames of one board."""
 
     def begin(self, camera: CameraDescription) -> None:
-        """Begin a board session. No frame of the previous one will follow.
-
-        Args:
-            camera: the board's camera as it is now.
-        """
+        """Begin a board session. No frame of the previous one will follow."""
 
     def change_period(self, board_period_ns: int) -> None:
         """Take note of the board camera's frame period from now on, ns. It is often the same as before."""
