@@ -17,8 +17,7 @@ class LinkReadings:
         all_seen: whether every process could be inspected.
         console: whether the kernel's console writes to it.
         terminals: processes whose controlling terminal it is, such as a getty.
-        problem: why it could not be opened; empty if it could, or was not tried.
-        remedy: what to do about that.
+        failure: why it could not be opened; None: it could, or was not tried.
         taken: whether the reason is that another process has it.
     """
 
@@ -27,8 +26,7 @@ class LinkReadings:
     all_seen: bool = True
     console: bool = False
     terminals: tuple[Holder, ...] = ()
-    problem: str = ""
-    remedy: str = ""
+    failure: Diagnostic | None = None
     taken: bool = False
 
 
@@ -52,8 +50,8 @@ def check_link(link: LinkReadings, service_pid: int) -> Diagnostic:  # noqa: PLR
         return fail("link", f"{link.uri}: {names} has it", "stop that program, or choose another link")
     if link.taken and not link.all_seen:
         return warn("link", f"{link.uri}: taken; by whom, only root may see", "ask again as root: sudo")
-    if link.problem:
-        return fail("link", link.problem, link.remedy)
+    if link.failure is not None:
+        return link.failure
     if "//127." in link.uri or "//localhost" in link.uri:
         return ok("link", f"{link.uri}: free; for programs of this machine only")
     return ok("link", f"{link.uri}: free")

@@ -8,6 +8,7 @@ from board_agent.doctor.link_checks import LinkReadings, check_link
 from common.diagnostic import Diagnostic, Severity
 from common.doctor import machine
 from common.doctor.access import Account, Holder, check_access
+from common.doctor.finding import fail
 from common.doctor.machine_checks import check_bluetooth
 from common.doctor.network_probe import examine_network
 from common.doctor.unit_check import Unit
@@ -81,8 +82,6 @@ def _tried(readings: LinkReadings, account: Account, *, listens_by_default: bool
         owner = parsed.owner or (str(account.uid) if parsed.address.startswith("ipc:") else "")
         open_link(replace(parsed, insecure=True, owner=owner)).close()
     except TandemError as error:
-        taken = isinstance(error, TakenError)
-        return LinkReadings(
-            uri=readings.uri, all_seen=readings.all_seen, problem=error.problem, remedy=error.remedy, taken=taken
-        )
+        failure = fail("link", error.problem, error.remedy)
+        return replace(readings, failure=failure, taken=isinstance(error, TakenError))
     return readings

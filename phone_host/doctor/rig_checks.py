@@ -17,8 +17,7 @@ class RigReadings:
 
     Attributes:
         path: the file.
-        problem: what is wrong with it; empty if it could be read and rectified.
-        remedy: what to do about that.
+        failure: what is wrong with it; None: it could be read and rectified.
         rms_px: stereo RMS, px; NaN = unknown.
         baseline_m: baseline, m.
         host_size_px: image size of the host camera in the rig, px.
@@ -27,8 +26,7 @@ class RigReadings:
     """
 
     path: str
-    problem: str = ""
-    remedy: str = ""
+    failure: Diagnostic | None = None
     rms_px: float = float("nan")
     baseline_m: float = float("nan")
     host_size_px: tuple[int, int] = (0, 0)
@@ -38,8 +36,8 @@ class RigReadings:
 
 def check_rig(rig: RigReadings) -> Diagnostic:
     """Judge a rig file."""
-    if rig.problem:
-        return fail("rig", rig.problem, rig.remedy)
+    if rig.failure is not None:
+        return rig.failure
     width_px, height_px = rig.host_size_px
     text = f"{rig.path}: baseline {rig.baseline_m * 1000:.1f} mm, host camera {width_px}x{height_px}"
     if rig.rms_px == rig.rms_px:

@@ -12,7 +12,7 @@ from common import now
 from common.camera.factory import parse_camera
 from common.camera.v4l2_stream import V4l2Settings
 from common.diagnostic import Diagnostic
-from common.doctor.finding import warn
+from common.doctor.finding import fail, warn
 from common.errors import AbsentBoardError, BusyBoardError, DataError, OtherVersionError, TandemError
 from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
@@ -83,7 +83,7 @@ def read_rig_readings(calibration: str, camera: str) -> RigReadings:
         rig = read_own_rig(Path(calibration))
         Rectifier(rig)
     except TandemError as error:
-        return RigReadings(calibration, error.problem, error.remedy)
+        return RigReadings(calibration, fail("rig", error.problem, error.remedy))
     own = rig.right if rig.board_side is Side.LEFT else rig.left
     is_ours = is_http(camera) or is_browser(camera)
     asked = parse_camera(camera, "") if camera and not is_ours else None

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from common.diagnostic import Diagnostic, Severity
+from common.doctor.finding import fail
 from common.errors import SettingsError
 from phone_host.cli import main
 from phone_host.doctor.host_checks import (
@@ -92,7 +93,7 @@ def test_packages_are_judged_by_version_and_company(package: Package, verdict: S
             FAIL,
             "size=640x480",
         ),
-        (RigReadings("rig.yaml", "rig.yaml: T is 80 m long", "T is in metres"), FAIL, "metres"),
+        (RigReadings("rig.yaml", fail("rig", "rig.yaml: T is 80 m long", "T is in metres")), FAIL, "metres"),
     ],
 )
 def test_a_rig_must_be_sound_and_fit_the_camera(rig: RigReadings, verdict: Severity, word: str) -> None:

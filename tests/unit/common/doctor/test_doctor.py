@@ -221,8 +221,16 @@ def test_a_taken_camera_is_judged_by_who_has_it(
         (LinkReadings(uri="tcp://127.0.0.1:5555"), OK, "this machine only"),
         (LinkReadings(uri="tcp://*:5555", holders=(AGENT,)), OK, "our own service"),
         (LinkReadings(uri="tcp://*:5555", holders=(OTHER,)), FAIL, "motion (pid 77)"),
-        (LinkReadings(uri="tcp://*:5555", all_seen=False, problem="in use", taken=True), WARN, "only root"),
-        (LinkReadings(uri="tcp://*:5555", problem="no such address", remedy="ip address"), FAIL, "no such address"),
+        (
+            LinkReadings(uri="tcp://*:5555", all_seen=False, failure=fail("link", "in use", ""), taken=True),
+            WARN,
+            "only root",
+        ),
+        (
+            LinkReadings(uri="tcp://*:5555", failure=fail("link", "no such address", "ip address")),
+            FAIL,
+            "no such address",
+        ),
         (LinkReadings(uri="serial:/dev/ttyGS0", terminals=(Holder(9, "agetty"),)), FAIL, "serial-getty@ttyGS0"),
         (LinkReadings(uri="serial:/dev/ttyS0", terminals=(Holder(9, "bash"),)), FAIL, "two readers"),
         (LinkReadings(uri="serial:/dev/ttyS0", console=True), FAIL, "console=ttyS0"),
