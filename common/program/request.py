@@ -29,6 +29,8 @@ class _Option:
     read: Callable[[str, str], Any] | None
     number: Callable[[str, str], float] | None
     alone: bool
+    often: bool
+    group: str
     declared: dict[str, Any]
 
     @property
@@ -58,6 +60,8 @@ def option(
     read: Callable[[str, str], Any] | None = None,
     number: Callable[[str, str], float] | None = None,
     alone: bool = False,
+    often: bool = False,
+    group: str = "",
     **declared: Any,  # noqa: ANN401 - argparse's own
 ) -> Any:  # noqa: ANN401 - stands in a dataclass field of any type, as dataclasses.field does
     """Declare a field of a request, and the option that gives it.
@@ -67,22 +71,25 @@ def option(
         read: makes the field's value of a text and the option's name, or raises SettingsError. What was given is kept as it was written.
         number: reads a number that may have a unit, likewise; what was given is kept as that number.
         alone: this option and the others that say so exclude each other.
+        often: many need it, so help shows it first, outside of its group.
+        group: title of the group in which help shows it; empty: that of its part.
         declared: what `ArgumentParser.add_argument` takes; the default is as a user writes it.
     """
-    made = _Option(flags, read, number, alone, declared)
+    made = _Option(flags, read, number, alone, often, group, declared)
     is_required = declared.get("required", not flags and declared.get("nargs") not in {"?", "*"})
     usual = MISSING if is_required else made.value(made.usual, "")
     return field(default=usual, metadata={_OPTION: made})
 
 
-def part(kind: type[T], when: str = "") -> T:
+def part(kind: type[T], when: str = "", group: str = "") -> T:
     """Declare a field of a request that is a group of options, which several requests share.
 
     Args:
         kind: the group: a dataclass of such fields.
         when: begins the help of each, such as "live: ".
+        group: title of the group in which help shows them; empty: none.
     """
-    return field(default_factory=kind, metadata={_PART: (kind, when)})
+    return field(default_factory=kind, metadata={_PART: (kind, when, group)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,8 +105,15 @@ class Request:
     given: Mapping[str, object] = field(default_factory=dict, repr=False, compare=False)
 
 
-def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "") -> None:
-    """Declare the options of a request, or of a group of options."""
+def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "", group: str = "") -> None:
+    """Declare the options of a request, or of a group of options.
+
+    Args:
+        parser: of the command.
+        kind: the dataclass.
+        when: begins the help of each.
+        group: title of the group in which help shows them; empty: none.
+    """
     alone = None
     for item in fields(kind):
         if _PART in item.metadata:
@@ -114,7 +128,11 @@ def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "") -> 
             declared["dest"] = made.key(item.name)
         if made.alone and alone is None:
             alone = parser.add_mutually_exclusive_group()
-        (alone if made.alone and alone else parser).add_argument(*made.flags or (item.name,), **declared)
+        place: Any = alone if made.alone and alone else parser
+        if (title := made.group or group) and made.flags and not made.often:
+            known = (each for each in parser._action_groups if each.title == title)  # noqa: SLF001 - argparse tells of them nowhere else
+            place = next(known, None) or parser.add_argument_group(title)
+        place.add_argument(*made.flags or (item.name,), **declared)
 
 
 def usual_values(kind: type) -> dict[str, object]:

@@ -113,15 +113,19 @@ class DepthOptions:
 
     calibration: str | None = option(
         "--calibration",
+        often=True,
         metavar="FILE",
         help="rig.yaml of the two cameras, made by phone-host calibrate; or, for rectified images, the calib.txt of Middlebury, ETH3D or KITTI",
     )
     use_rejected_rig: bool = option(
         "--use-rejected-rig",
+        group="calibration",
         action="store_true",
         help="use a rig.yaml that its calibration rejected; expect wrong depth",
     )
-    rectified: bool = option("--rectified", action="store_true", help="the images are already rectified")
+    rectified: bool = option(
+        "--rectified", group="calibration", action="store_true", help="the images are already rectified"
+    )
     disparities: int | None = option(
         "--disparities",
         type=int,
@@ -130,6 +134,7 @@ class DepthOptions:
     )
     near_m: float | None = option(
         "--near",
+        often=True,
         read=near_of,
         metavar="MM",
         help=f"cut what is nearer, and look for nothing nearer; 20cm and 0.2m work, too (default: look from {DEFAULT_NEAR_MM:g} mm on, cut nothing)",
@@ -141,19 +146,28 @@ class DepthOptions:
         help="match images of this share of the size, 0.1 to 1; results keep the full size (default: 1, less for large images)",
     )
     focal_px: float | None = option(
-        "--focal", read=_focal_px, metavar="PX", help="focal length of the rectified images, px"
+        "--focal", group="calibration", read=_focal_px, metavar="PX", help="focal length of the rectified images, px"
     )
     baseline_m: float | None = option(
         "--baseline",
+        group="calibration",
         read=lambda text, _: baseline_mm(text) / 1000,
         metavar="MM",
         help="distance of the two cameras, for rectified images",
     )
     doffs_px: float | None = option(
-        "--doffs", read=_pixels, metavar="PX", help="x of the right principal point minus the left, px (default 0)"
+        "--doffs",
+        group="calibration",
+        read=_pixels,
+        metavar="PX",
+        help="x of the right principal point minus the left, px (default 0)",
     )
     center_px: tuple[float, float] | None = option(
-        "--center", read=point_px, metavar="CX,CY", help="principal point of the left rectified image"
+        "--center",
+        group="calibration",
+        read=point_px,
+        metavar="CX,CY",
+        help="principal point of the left rectified image",
     )
     matcher: str | None = option(
         "--matcher",
@@ -162,6 +176,7 @@ class DepthOptions:
     )
     overlay: Path | None = option(
         "--overlay",
+        group="calibration",
         type=Path,
         metavar="FILE",
         help="overlay.yaml that a run saved: how the cameras had turned against each other since the calibration",
@@ -177,6 +192,7 @@ class LimitedDepthOptions(DepthOptions):
 
     far_m: float | None = option(
         "--far",
+        often=True,
         read=far_of,
         metavar="MM",
         help="cut points with a coordinate beyond this (default: where an error of 0.25 px, or the rig's own, makes the depth wrong by 20 %%)",
@@ -202,12 +218,14 @@ class OnePairDepthOptions(DepthOptions):
 
     calibration: str = option(  # required here
         "--calibration",
+        often=True,
         required=True,
         metavar="FILE",
         help="rig.yaml of the two cameras; or, for rectified images, the calib.txt of Middlebury, ETH3D or KITTI",
     )
     use_rejected_rig: bool = option(
         "--use-rejected-rig",
+        group="calibration",
         action="store_true",
         help="use a rig.yaml that its calibration rejected; expect wrong lengths",
     )

@@ -27,11 +27,14 @@ class CameraOptions:
 
     link: tuple[str, ...] | None = option(
         "--link",
+        often=True,
         action="append",
         metavar="URI",
         help=f"{_FORMS}; repeat the option: the frames come over the best link that is up",
     )
-    camera: str | None = option("--camera", metavar="URI", help=f"camera of this machine: {EXAMPLE}; {TURNED}")
+    camera: str | None = option(
+        "--camera", often=True, metavar="URI", help=f"camera of this machine: {EXAMPLE}; {TURNED}"
+    )
     wait_s: float | None = option("--wait", number=seconds, metavar="S", help=_WAIT_HELP.format(""))
     keys: str | None = option("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
 
@@ -40,7 +43,7 @@ class CameraOptions:
 class OneLinkOptions(CameraOptions):
     """The same, with one link."""
 
-    link: str | None = option("--link", metavar="URI", help=_FORMS)  # type: ignore[assignment]  # one in place of several
+    link: str | None = option("--link", often=True, metavar="URI", help=_FORMS)  # type: ignore[assignment]  # one in place of several
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

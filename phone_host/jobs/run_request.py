@@ -39,33 +39,37 @@ def _topics(text: str, option: str) -> frozenset[Computed]:
 class RunRequest(Request):
     """What a run can be told."""
 
-    config: Path | None = option("--config", type=Path, metavar="FILE", help="settings file (TOML)")
-    cameras: RunCameraOptions = part(RunCameraOptions)
-    depth: LimitedDepthOptions = part(LimitedDepthOptions)
+    cameras: RunCameraOptions = part(RunCameraOptions, group="cameras and links")
+    depth: LimitedDepthOptions = part(LimitedDepthOptions, group="depth")
     no_correction: bool = option(
         "--no-correction",
+        group="calibration",
         action="store_true",
         help="only tell when the cameras have turned since the calibration; correct nothing",
     )
     board_side: Side | None = option(
         "--board-side",
+        group="cameras and links",
         read=lambda text, _: Side(text),
         choices=("left", "right"),
         help="which view the board's camera gives (default: as in the calibration, else left)",
     )
     fifo: str | None = option(
         "--fifo",
+        group="depth",
         metavar="DEPTH:POLICY",
         help="length of the queue before the matcher, and what happens when it is full: drop-oldest, drop-newest or block (default 1:drop-oldest)",
     )
     budget_ms: float | None = option(
         "--budget",
+        group="depth",
         number=milliseconds,
         metavar="MS",
         help="time for each pair: choose working size, search range and matcher to hold it, and follow when the machine slows down; --scale, --matcher, --disparities and --near stay as given (default: no budget)",
     )
     align_phase: str | None = option(
         "--align-phase",
+        group="cameras and links",
         nargs="?",
         const="either",
         choices=("either", "board", "host"),
@@ -73,12 +77,14 @@ class RunRequest(Request):
     )
     interpolate: bool | None = option(
         "--interpolate",
+        group="depth",
         action="store_true",
         default=None,
         help="move the board's image along the optical flow to the moment of the other camera's exposure",
     )
     pairs: int | None = option(
         "--pairs",
+        group="output",
         type=int,
         metavar="N",
         help="end after N pairs; exit with code 4 if the stream ends before that (default 0: no limit)",
@@ -98,6 +104,7 @@ class RunRequest(Request):
     )
     record_topics: frozenset[Computed] | None = option(
         "--record-topics",
+        group="output",
         read=_topics,
         metavar="NAMES",
         help="with --record: also what was computed, at most once a second: depth, cloud, or depth,cloud",
@@ -112,6 +119,7 @@ class RunRequest(Request):
     )
     save_every: int = option(
         "--save-every",
+        group="output",
         type=int,
         default=30,
         metavar="N",
@@ -124,10 +132,14 @@ class RunRequest(Request):
         metavar="HOST:PORT",
         help="show the run on a page of this machine (default 127.0.0.1:8765, with --lan 0.0.0.0:8765); phone-host serve does more",
     )
-    lan: bool = option("--lan", action="store_true", help=f"with --serve: {LAN_HELP}")
-    max_megapixels: int | None = option("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    lan: bool = option("--lan", group="output", action="store_true", help=f"with --serve: {LAN_HELP}")
+    max_megapixels: int | None = option(
+        "--max-megapixels", group="cameras and links", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP
+    )
+    config: Path | None = option("--config", group="settings", type=Path, metavar="FILE", help="settings file (TOML)")
     log_level: str | None = option(
         "--log-level",
+        group="settings",
         choices=("debug", "info", "warning", "error"),
         help="least important messages that are logged to stderr",
     )

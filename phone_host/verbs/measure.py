@@ -88,7 +88,7 @@ class MeasureRequest(Request):
         help="points of the left image, px, as it is taken and upright; the centre of the first pixel is 0,0. Of several, the distance"
         " from each to the next is told, too. A point that cannot be measured is named, the others are told; the exit code is then 4",
     )
-    pictures: ImageOptions = part(ImageOptions)
+    pictures: ImageOptions = part(ImageOptions, group="pictures")
 
 
 def run(request: MeasureRequest) -> int:

@@ -65,8 +65,8 @@ class QualityRequest(Request):
         help="the region that counts, px of the rectified left image (default: the middle 40 %% x 40 %%, or the board inside its"
         " outermost inner corners)",
     )
-    depth: DepthOptions = part(DepthOptions)
-    pictures: ImageOptions = part(ImageOptions)
+    depth: DepthOptions = part(DepthOptions, group="depth")
+    pictures: ImageOptions = part(ImageOptions, group="pictures")
     out: Path = option(
         "--out",
         type=Path,

@@ -79,7 +79,7 @@ class ReliefRequest(Request):
     out: Path = option(
         "--out", type=Path, default=Path(), metavar="DIR", help="folder for the files (default: the current folder)"
     )
-    pictures: ImageOptions = part(ImageOptions)
+    pictures: ImageOptions = part(ImageOptions, group="pictures")
 
 
 def run(request: ReliefRequest) -> int:

@@ -36,8 +36,8 @@ class StereoRequest(Request):
         metavar="LEFT RIGHT",
         help=f"images of the left and of the right camera: {PAIRED}",
     )
-    depth: LimitedDepthOptions = part(LimitedDepthOptions)
-    pictures: ImageOptions = part(ImageOptions)
+    depth: LimitedDepthOptions = part(LimitedDepthOptions, group="depth")
+    pictures: ImageOptions = part(ImageOptions, group="pictures")
     out: Path = option(
         "--out",
         type=Path,

@@ -52,9 +52,10 @@ class CalibrateRequest(Request):
         action="store_true",
         help="take the pictures now, from both cameras: says what to show, takes each view by itself, ends when it is enough",
     )
-    cameras: PairOptions = part(PairOptions, "for --live: ")
+    cameras: PairOptions = part(PairOptions, "for --live: ", "cameras and links")
     most_views: int = option(
         "--views",
+        group="cameras and links",
         type=int,
         default=25,
         metavar="N",
@@ -62,12 +63,14 @@ class CalibrateRequest(Request):
     )
     sound: bool = option(
         "--sound",
+        group="cameras and links",
         action=argparse.BooleanOptionalAction,
         default=True,
         help="for --live: speak, if the system has a speech program, else ring the terminal's bell (default: yes)",
     )
     snapshots: Path | None = option(
         "--snapshots",
+        group="cameras and links",
         type=Path,
         metavar="DIR",
         help="for --live: folder for guide.json and guide.svg, what is shown just now",
@@ -88,6 +91,7 @@ class CalibrateRequest(Request):
     )
     baseline_m: float | None = option(
         "--baseline",
+        group="calibration",
         read=lambda text, _: baseline_mm(text) / 1000,
         metavar="80mm",
         help="distance of the two lenses, as you measure it with a ruler: it shows whether --square is right",
@@ -100,6 +104,7 @@ class CalibrateRequest(Request):
     )
     pose_only: bool = option(
         "--pose-only",
+        group="calibration",
         action="store_true",
         help="with --from: keep its lenses, compute only how the cameras stand to each other, from these pictures alone",
     )
@@ -114,12 +119,14 @@ class CalibrateRequest(Request):
     )
     unit_m: float | None = option(
         "--unit",
+        group="other programs",
         read=lambda text, name: length_mm(text, name, "1mm") / 1000,
         metavar="1mm",
         help="for --import: what 1 in the file's lengths is, where that is not 1 m, such as 25mm for squares",
     )
     sizes_px: Sizes | None = option(
         "--size",
+        group="other programs",
         read=_sizes_px,
         metavar="WxH",
         help="for --import: size of the images in px where the files do not state it; WxH,WxH if left and right differ",
@@ -135,11 +142,12 @@ class CalibrateRequest(Request):
     )
     board_side: Side | None = option(
         "--board-side",
+        group="cameras and links",
         read=lambda text, _: Side(text),
         choices=("left", "right"),
         help="which of the two is the board's camera (default left, or as in --from)",
     )
-    pictures: ImageOptions = part(ImageOptions)
+    pictures: ImageOptions = part(ImageOptions, group="pictures")
     out: Path = option(
         "--out",
         type=Path,
