@@ -103,7 +103,7 @@ class Calibration:
             may_write: raises if nothing shall be written.
         """
         out = self.request.out
-        report = calibrate_pictures(self.request, self.asked, self.views.taken(_Nobody()), may_write).report
+        report = calibrate_pictures(self.request, self.asked, self.views.taken(), may_write).report
         if isinstance(report.result, DataError):
             trouble = diagnostic_of(report.result)
             return Calibrated(f"no calibration: {trouble.message}", trouble)
@@ -111,12 +111,6 @@ class Calibration:
         if report.verdict is Verdict.REJECT:
             return Calibrated(words, Diagnostic("the calibration is rejected", report.remedy, Severity.FAIL))
         return Calibrated(words, rig=out.absolute())
-
-
-class _Nobody:
-    """Nobody wants the end of it all: the page's stop does not come this far."""
-
-    interrupted = False
 
 
 class Commands:

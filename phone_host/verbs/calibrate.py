@@ -38,11 +38,11 @@ def run(request: CalibrateRequest) -> int:
     asked = asked_of(request)
     require_rig_place(request.out)
     require_alone(request.out.parent)
-    live = None
+    live = signals = None
     if request.live:
         from phone_host.jobs.calibrate.live import take_views  # noqa: PLC0415 - cameras and links: 0.2 s that pictures need not wait for
 
-        live = take_views(request, asked)
+        live, signals = take_views(request, asked)
     made = calibrate_pictures(request, asked, live)
     if request.as_json:
         print(json_text(calibration_values(made.report)))
@@ -51,7 +51,7 @@ def run(request: CalibrateRequest) -> int:
     if isinstance(made.report.result, DataError):
         raise made.report.result
     # Asked only now: Ctrl-C may have come while the rig was computed.
-    return exit_code(made.report.verdict, is_interrupted=live is not None and live.signals.interrupted)
+    return exit_code(made.report.verdict, is_interrupted=signals is not None and signals.interrupted)
 
 
 def exit_code(verdict: Verdict, *, is_interrupted: bool) -> int:

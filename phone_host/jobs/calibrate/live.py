@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 from common import now
 from common.errors import DataError, SettingsError
@@ -58,14 +58,6 @@ _WAITED_NS: Final = 1_000_000_000
 """A board that is there is met within a fifth of this; then there is nothing to say."""
 
 
-class Interrupted(Protocol):
-    """Knows whether somebody wants the end of it all, not only of the views."""
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether that is so by now."""
-
-
 @dataclass(frozen=True, slots=True)
 class Live:
     """How a live calibration went.
@@ -74,13 +66,11 @@ class Live:
         last: its last snapshot.
         left: folder of the left pictures.
         right: folder of the right ones.
-        signals: what asked the process to stop, until now.
     """
 
     last: GuideSnapshot
     left: Path
     right: Path
-    signals: Interrupted
 
     @property
     def folders(self) -> tuple[str, str]:
@@ -150,11 +140,8 @@ class PreparedViews:
             raise unwritable(self.left, error, "LEFT or --snapshots") from error
         show()
 
-    def taken(self, signals: Interrupted) -> Live:
+    def taken(self) -> Live:
         """Return how it went.
-
-        Args:
-            signals: what may have interrupted it.
 
         Raises:
             DataError: too few views were taken to calibrate from.
@@ -162,7 +149,7 @@ class PreparedViews:
         last = self.live.snapshot()
         if last.views < self.least:
             raise _too_few(last, self.least)
-        return Live(last, self.left, self.right, signals)
+        return Live(last, self.left, self.right)
 
 
 def prepare_views(
@@ -214,12 +201,15 @@ def prepare_views(
     return PreparedViews(live, named, settings.left, settings.right, _least_views(request))
 
 
-def take_views(request: CalibrateRequest, asked: Asked) -> Live:
+def take_views(request: CalibrateRequest, asked: Asked) -> tuple[Live, StopSignals]:
     """Take views until it is enough.
 
     Args:
         request: of the calibration.
         asked: what it asks for, with what the earlier calibration says.
+
+    Returns:
+        How it went, and what asked the process to stop, until now.
 
     Raises:
         SettingsError: an option is missing or not valid, or the person shows another board.
@@ -231,7 +221,7 @@ def take_views(request: CalibrateRequest, asked: Asked) -> Live:
     signals = StopSignals()
     _run(prepared, request, signals)
     try:
-        return prepared.taken(signals)
+        return prepared.taken(), signals
     except DataError as reason:
         if not signals.interrupted:
             raise
