@@ -9,7 +9,7 @@ from pathlib import Path
 
 from board_agent import examples
 from common.camera.options import EXAMPLE
-from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.commandline import ExamplesFirstParser, add_manual_options, add_version_option, run_command
 from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from common.program.quantities import file_size, frames_per_second, reading, seconds
@@ -47,6 +47,7 @@ def parser() -> argparse.ArgumentParser:
     """All verbs with their options."""
     made = ExamplesFirstParser("board-agent", description=examples.GENERAL)
     add_version_option(made)
+    add_manual_options(made)
     verbs = made.add_subparsers(dest="verb", metavar="VERB")
     run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=examples.RUN)
     record = verbs.add_parser(

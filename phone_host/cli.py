@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.commandline import ExamplesFirstParser, add_manual_options, add_version_option, run_command
 from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from common.program.request import add_options, read_request
@@ -140,6 +140,7 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser with all verbs."""
     made = ExamplesFirstParser("phone-host", description=_EXAMPLES)
     add_version_option(made)
+    add_manual_options(made)
     verbs = made.add_subparsers(dest="verb", metavar="VERB", parser_class=_VerbParser)
     for name, summary in _VERBS.items():
         verbs.add_parser(name, help=summary)

@@ -197,6 +197,31 @@ def add_version_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
+class _ManualAction(argparse.Action):
+    """Prints the man page, or what completes command lines in a shell, and exits."""
+
+    def __call__(self, parser: argparse.ArgumentParser, _: object, shell: Any, *__: object) -> None:  # noqa: ANN401 - argparse's own
+        from common.program.manual import completion, man_page  # noqa: PLC0415 - a start does not pay for it
+
+        print(completion(parser, shell) if shell else man_page(parser), end="")
+        parser.exit()
+
+
+def add_manual_options(parser: argparse.ArgumentParser) -> None:
+    """Add `--man` and `--completion`.
+
+    Args:
+        parser: the command's own parser.
+    """
+    parser.add_argument("--man", action=_ManualAction, nargs=0, help="print the man page")
+    parser.add_argument(
+        "--completion",
+        action=_ManualAction,
+        choices=("bash", "zsh", "fish"),
+        help="print a script that completes command lines in this shell",
+    )
+
+
 def run_command(
     parser: argparse.ArgumentParser, arguments: Sequence[str] | None, command: Callable[[argparse.Namespace], int]
 ) -> int:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from common.program.commandline import ExamplesFirstParser, add_version_option, run_command
+from common.program.commandline import ExamplesFirstParser, add_manual_options, add_version_option, run_command
 from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from common.program.quantities import reading, seconds
@@ -65,6 +65,7 @@ def parser() -> argparse.ArgumentParser:
     """Make the parser with all options."""
     made = ExamplesFirstParser("delay-bench", description=_EXAMPLES)
     add_version_option(made)
+    add_manual_options(made)
     made.add_argument(
         "--links",
         metavar="NAMES",
