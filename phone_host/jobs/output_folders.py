@@ -47,49 +47,26 @@ def require_alone(folder: Path, file: str = "", option: str = "--out") -> None:
 
 
 @contextmanager
-def written_together(out: Path, *names: str, command: str = "") -> Iterator[Path]:
+def written_together(out: Path, *names: str, command: str = "", replaces: Sequence[str] = ()) -> Iterator[Path]:
     """Write files that take the place of an earlier command's if the block ends without an error; else those stay as they are.
 
     Args:
         out: the folder that the user gave; created if missing.
         names: names of the files.
         command: the verb whose report is among them; empty: it has none. Another verb's report stays under another name.
+        replaces: names of what goes without a new one.
 
     Yields:
-        Where to write them.
+        Where to write them, and further files, which need not be from an earlier command.
 
     Raises:
         UnavailableError: such a file is not from an earlier command, another program writes there, or it cannot be written.
     """
     try:
-        with replacing_results(out, "|".join(map(re.escape, names)), names, command=command) as place:
+        with replacing_results(out, "|".join(map(re.escape, (*names, *replaces))), names, command=command) as place:
             yield place
     except OSError as error:
         raise unwritable(out, error) from error
-
-
-@contextmanager
-def written_beside(out: Path, *names: str, command: str, replaces: Sequence[str] = ()) -> Iterator[Path]:
-    """Write a file that the user named, and others beside it, as `written_together` does. The file need not be from an earlier command.
-
-    Args:
-        out: the file that the user named; its folder is created if missing.
-        names: names of what is written beside it.
-        command: the verb whose report is among them.
-        replaces: names of what goes without a new one.
-
-    Yields:
-        The folder to write them in.
-
-    Raises:
-        UnavailableError: another program writes there, or it cannot be written.
-    """
-    try:
-        pattern = "|".join(map(re.escape, (*names, *replaces)))
-        with replacing_results(out.parent, pattern, names, command=command) as place:
-            yield place
-    except OSError as error:
-        raise unwritable(out.parent, error) from error
 
 
 def claim_names(folder: Path, out: Path, *names: str) -> None:

@@ -21,7 +21,6 @@ from phone_host.jobs.output_folders import (
     require_file,
     spare_names,
     stale_page,
-    written_beside,
     written_together,
 )
 from phone_host.model import Rectification, Rig, Side
@@ -71,8 +70,8 @@ def import_calibration(request: CalibrateRequest) -> tuple[ImportReport, list[st
     report = ImportReport(imported=found, exported=write_exports(request, found.rig, rectification, found.files))
     if not same:
         views = read_rig_views(found.files[0]) if found.kind is RigKind.RIG else None
-        with written_beside(
-            request.out, REPORT, replaces=stale_page(request.out.parent, "calibrate"), command="calibrate"
+        with written_together(
+            request.out.parent, REPORT, replaces=stale_page(request.out.parent, "calibrate"), command="calibrate"
         ) as place:
             report = replace(report, earlier_rig=replace_rig(place, request.out, found.rig, rectification, views))
             write_text(place / REPORT, json_text(import_values(report), indent=2) + "\n")

@@ -38,7 +38,7 @@ from phone_host.jobs.output_folders import (
     claim_names,
     require_file,
     spare_names,
-    written_beside,
+    written_together,
 )
 from phone_host.jobs.picture_pairs import GivenPictures, given_pictures
 from phone_host.output.atomic import write_text
@@ -147,7 +147,7 @@ def calibrate_pictures(
     order = [name for name, _, _ in files.pairs]
     taken = Taken(order=order, views=views, pairs=solved.pairs, seen=solved.seen, board=series.board)
     lines = _file_notes(files, given)
-    with written_beside(out, REPORT, PAGE, command="calibrate") as place:
+    with written_together(out.parent, REPORT, PAGE, command="calibrate") as place:
         if isinstance(result, DataError):
             report = replace(report, earlier_rig=replace_rig(place, out, None, None))
             page, more = series_of_failure(taken, result), []
