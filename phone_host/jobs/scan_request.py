@@ -93,6 +93,7 @@ class ModelOptions:
 
     mat: Mat | None = option(
         "--mat",
+        often=True,
         read=_mat_of,
         nargs="?",
         const="usual",
@@ -102,6 +103,7 @@ class ModelOptions:
     )
     on_table: bool = option(
         "--object",
+        often=True,
         action="store_true",
         help="scan what stands on a table, without a mat, while the cameras go around it: table and background are found and left out, and the model"
         " stands on the table, z up; the first pair must show the object in its middle and the table around it",
@@ -134,6 +136,7 @@ class ModelOptions:
     )
     turntable: bool = option(
         "--turntable",
+        often=True,
         action="store_true",
         help="the cameras stand still and an object turns before them, on anything or by hand, about one axis and by 3 to 15 degrees between the"
         " pairs; background and table are left out, and the turn is closed after 360 degrees",
@@ -156,38 +159,51 @@ class ScanRequest(Request):
         help=f"images in the order in which they were taken, each pair sharing most of what the last one shows; without them two cameras are"
         f" scanned live: {PAIRED}",
     )
-    config: Path | None = option("--config", type=Path, metavar="FILE", help="live: settings file (TOML)")
-    cameras: PairOptions = part(PairOptions, "live: ")
+    config: Path | None = option(
+        "--config", group="settings", type=Path, metavar="FILE", help="live: settings file (TOML)"
+    )
+    cameras: PairOptions = part(PairOptions, "live: ", group="cameras and links")
     board_side: Side | None = option(
         "--board-side",
+        group="cameras and links",
         read=lambda text, _: Side(text),
         choices=("left", "right"),
         help="live: which view the board's camera gives (default: as in the calibration, else left)",
     )
     replay: str | None = option(
         "--replay",
+        group="cameras and links",
         metavar="FILE.mcap",
         help="play a recording in place of --link and --camera: all of its pairs, the same each time; without --calibration the rig.yaml in it counts",
     )
     record: Path | None = option(
         "--record",
+        group="output",
         type=Path,
         metavar="FILE.mcap",
         help="live: also keep what both cameras give, to scan it again with --replay: finer, or after a crash",
     )
-    pairs: int | None = option("--pairs", type=int, metavar="N", help="live: end after N pairs (default 0: no limit)")
+    pairs: int | None = option(
+        "--pairs",
+        group="cameras and links",
+        type=int,
+        metavar="N",
+        help="live: end after N pairs (default 0: no limit)",
+    )
     duration_s: float = option(
         "--seconds",
+        group="cameras and links",
         number=seconds,
         default=0.0,
         metavar="S",
         help="live: end S seconds after the first pair (default: with Ctrl-C or SIGTERM)",
     )
-    depth: LimitedDepthOptions = part(LimitedDepthOptions)
-    pictures: ImageOptions = part(ImageOptions)
-    model: ModelOptions = part(ModelOptions)
+    depth: LimitedDepthOptions = part(LimitedDepthOptions, group="depth")
+    pictures: ImageOptions = part(ImageOptions, group="pictures")
+    model: ModelOptions = part(ModelOptions, group="model")
     resume: Path | None = option(
         "--resume",
+        group="output",
         type=Path,
         metavar="DIR",
         help="go on with a scan that was killed, from the last submap that it has written into its folder, one every 20 pairs of the model;"
@@ -195,11 +211,13 @@ class ScanRequest(Request):
     )
     restart: bool = option(
         "--restart",
+        group="output",
         action="store_true",
         help="start again where --out holds what a scan that was killed has written; without it that is refused",
     )
     out: Path = option(
         "--out",
+        often=True,
         type=Path,
         required=True,
         metavar="DIR",

@@ -20,7 +20,7 @@ def test_a_man_page_names_every_verb_and_option(make: Callable[[], argparse.Argu
     """Troff takes it without a warning, and shows each option as it is typed."""
     parser = make()
     page = man_page(parser)
-    flags = {flag for verb, _ in verbs_of(parser).values() for flag in verb._option_string_actions}
+    flags = {flag for verb, _ in verbs_of(parser).values() for flag in verb._option_string_actions}  # noqa: SLF001 - argparse tells of them nowhere else
     shown = page.replace(r"\-", "-")
     assert all(f".SS {name}\n" in shown for name in verbs_of(parser))
     assert flags <= set(shown.replace(",", " ").split())
@@ -63,4 +63,4 @@ def test_other_shells_get_what_bash_gets() -> None:
     lines = completion(parser, "fish").splitlines()
     for name, (verb, _) in verbs_of(parser).items():
         own = [line for line in lines if f"from {name}'" in line]
-        assert len(own) == len(verb._option_string_actions)
+        assert len(own) == len(verb._option_string_actions)  # noqa: SLF001 - likewise
