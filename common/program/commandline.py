@@ -54,10 +54,15 @@ class ExamplesFirstParser(argparse.ArgumentParser):
 
     def add_argument(self, *names: str, **options: Any) -> argparse.Action:  # noqa: ANN401 - argparse's own
         """Declare an argument. What is given must not be empty: to Path, that would be the current folder, and to others as if nothing was given."""
-        if options.get("action", "store") in {"store", "append"}:
-            kind = options.get("type", str)
-            options["type"] = _READERS.get(kind, kind)
-        return super().add_argument(*names, **options)
+        return super().add_argument(*names, **_with_reader(options))
+
+    def add_argument_group(self, *given: Any, **options: Any) -> Any:  # noqa: ANN401 - argparse's own
+        """Begin a titled group of arguments, which are read as the parser's own."""
+        return _reading_alike(super().add_argument_group(*given, **options))
+
+    def add_mutually_exclusive_group(self, **options: Any) -> Any:  # noqa: ANN401 - argparse's own
+        """Begin a group of arguments that exclude each other, which are read as the parser's own."""
+        return _reading_alike(super().add_mutually_exclusive_group(**options))
 
     def format_help(self) -> str:
         """Return the help text."""
@@ -154,6 +159,21 @@ def _text(text: str) -> str:
 
 _READERS: Final[dict[Any, Callable[[str], Any]]] = {Path: _path, str: _text, int: whole_number, float: decimal_number}
 """What reads the values of arguments that are declared with one of Python's own types."""
+
+
+def _with_reader(options: dict[str, Any]) -> dict[str, Any]:
+    """Return how an argument is declared, with what reads its values."""
+    if options.get("action", "store") not in {"store", "append"}:
+        return options
+    kind = options.get("type", str)
+    return {**options, "type": _READERS.get(kind, kind)}
+
+
+def _reading_alike(group: Any) -> Any:  # noqa: ANN401 - argparse's groups
+    """Have a group of arguments read their values as the parser's own do: argparse's groups do not ask the parser."""
+    declare = group.add_argument
+    group.add_argument = lambda *names, **options: declare(*names, **_with_reader(options))
+    return group
 
 
 def _no_choice(name: str, given: str, choices: Sequence[str]) -> str:

@@ -53,6 +53,13 @@ def _help(action: argparse.Action) -> str:
     return (action.help or "").replace("%%", "%")
 
 
+_PURPOSES: Final = {
+    "board-agent": "stream a board's time-stamped camera frames to tandemscan's host",
+    "delay-bench": "measure every delay of each link between board and host",
+    "phone-host": "make depth and 3D models of two cameras' images",
+}
+
+
 def _roff(text: str) -> str:
     """Return a text that troff shows as it is."""
     return re.sub(r"^([.'])", r"\\&\1", text.replace("\\", r"\e").replace("-", r"\-"), flags=re.MULTILINE)
@@ -60,7 +67,8 @@ def _roff(text: str) -> str:
 
 def _entries(parser: argparse.ArgumentParser) -> Iterator[str]:
     for each in _declared(parser):
-        value = each.metavar or "{" + ",".join(map(str, each.choices)) + "}" if each.choices else each.metavar or ""
+        called = " ".join(each.metavar) if isinstance(each.metavar, tuple) else each.metavar or ""
+        value = called or "{" + ",".join(map(str, each.choices)) + "}" if each.choices else called
         name = ", ".join(each.option_strings)
         shown = f"{name} {value}".strip() if each.nargs != 0 else name
         yield f".TP\n.B {_roff(shown or each.dest)}\n{_roff(_help(each))}\n"
@@ -75,7 +83,9 @@ def man_page(parser: argparse.ArgumentParser) -> str:
     program, verbs = parser.prog, verbs_of(parser)
     synopsis = "VERB [OPTION ...]" if verbs else "[OPTION ...]"
     examples = textwrap.dedent((parser.description or "").removeprefix("examples:\n")).strip()
-    made = f'.TH {program.upper()} 1 "" tandemscan "User Commands"\n.ad l\n.SH NAME\n{program} \\- two cameras, one metric 3D scanner\n'
+    made = (
+        f'.TH {program.upper()} 1 "" tandemscan "User Commands"\n.ad l\n.SH NAME\n{program} \\- {_PURPOSES[program]}\n'
+    )
     made += f".SH SYNOPSIS\n.B {_roff(program)}\n{_roff(synopsis)}\n.SH EXAMPLES\n.nf\n{_roff(examples)}\n.fi\n"
     made += "".join([".SH OPTIONS\n", *_entries(parser)])
     if verbs:

@@ -129,7 +129,7 @@ def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "", gro
         if made.alone and alone is None:
             alone = parser.add_mutually_exclusive_group()
         place: Any = alone if made.alone and alone else parser
-        if (title := made.group or group) and made.flags and not made.often:
+        if place is parser and (title := made.group or group) and made.flags and not made.often:
             known = (each for each in parser._action_groups if each.title == title)  # noqa: SLF001 - argparse tells of them nowhere else
             place = next(known, None) or parser.add_argument_group(title)
         place.add_argument(*made.flags or (item.name,), **declared)

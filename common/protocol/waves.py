@@ -122,7 +122,7 @@ class Waves:
         wave, all answers are of that kind. A fast echo is kept until its wave has ended: learning from it takes longer than the echo did, so the
         board's processor would go idle meanwhile and wake late, and every question would travel longer than its answer (decision 0009).
 
-        Echoes to learn from, and the wave's next question if there is one.
+        Returns:
             Echoes to learn from, and the wave's next question, if there is one.
         """
         if self._first_wave < pong.wave < self._wave:

@@ -108,7 +108,10 @@ def why_not_measurable(interface: Interface) -> str:
 
 
 def ask_board(uri: str, patience_ns: int, stop: Callable[[], bool]) -> Case | None:
-    """Ask a remote board what its camera shows; nothing else can be measured there: the case; None if `stop` ended it.
+    """Ask a remote board what its camera shows; nothing else can be measured there.
+
+    Returns:
+        The case; None if `stop` ended it.
 
     Raises:
         UnavailableError: there is no board, it is busy, or it gives images only on demand.

@@ -57,7 +57,7 @@ def written_together(out: Path, *names: str, command: str = "", replaces: Sequen
         replaces: names of what goes without a new one.
 
     Yields:
-        Where to write them, and further files, which need not be from an earlier command.
+        Where to write them, and further files beside them, such as a rig.yaml, which need not be from an earlier command.
 
     Raises:
         UnavailableError: such a file is not from an earlier command, another program writes there, or it cannot be written.

@@ -10,8 +10,8 @@ from common.orientation import UPRIGHT
 from common.program import logs
 from common.program.request import read_request, usual_values
 from common.program.settings import Resolved, log_level
+from common.program.signals import StopSignals
 from common.protocol.message import Pacing
-from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.jobs.output_folders import (
@@ -21,7 +21,7 @@ from phone_host.jobs.output_folders import (
     spare_inputs,
     writing,
 )
-from phone_host.jobs.run import PreparedRun, open_run
+from phone_host.jobs.run import Opened, PreparedRun, open_run
 from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.jobs.scan_request import ScanRequest, axes_beside, model_wanted, resumed_of
 from phone_host.output.axes import Axes
@@ -100,13 +100,18 @@ class PreparedScan:
         self.tell(partial_words(place, self.out))
 
 
-def open_scan(request: ScanRequest, words: Sequence[str], tell: Callable[[str], None]) -> PreparedScan:
+def open_scan(
+    request: ScanRequest, words: Sequence[str], tell: Callable[[str], None]
+) -> tuple[PreparedScan, StopSignals]:
     """Open a scan of what two cameras give, or of a recording.
 
     Args:
         request: of the scan, without pictures.
         words: of the command line.
         tell: takes a line that the user should know.
+
+    Returns:
+        The scan, and what asks the process to stop from the moment on at which cameras and links are open.
 
     Raises:
         SettingsError: options contradict each other, or give no depth in metres.
@@ -116,17 +121,19 @@ def open_scan(request: ScanRequest, words: Sequence[str], tell: Callable[[str], 
     wanted = model_wanted(request.model, request.out)
     # the run beneath writes nothing itself
     own = {name: request.given.get(name, usual) for name, usual in usual_values(RunRequest).items()}
-    run = read_request(RunRequest, {**own, "json": False, "debug": False, "out": None})
+    told = {name: request.given.get(name, False) for name in ("json", "debug")}
+    run = read_request(RunRequest, {**own, **told, "out": None})
     axes = axes_beside(request.depth.axes, wanted)
     found = checked(run)
     _require(request, found.values)
     resumed = resumed_of(request, tell)
     logs.set_up(log_level(found.values.log_level))
-    return prepare_scan(run, found, wanted, axes, request.out, tell=tell, words=words, resumed=resumed)
+    opened, signals = open_run(run, found, tell), StopSignals()
+    return prepare_scan(opened, found, wanted, axes, request.out, tell=tell, words=words, resumed=resumed), signals
 
 
 def prepare_scan(
-    run: RunRequest,
+    opened: Opened,
     found: Resolved[PhoneHostSettings],
     wanted: ScanWanted,
     axes: Axes,
@@ -135,13 +142,12 @@ def prepare_scan(
     tell: Callable[[str], None],
     words: Sequence[str] = (),
     resumed: tuple[Submap, ...] = (),
-    feed: BrowserFeed | None = None,
     sinks_of: SinksOf = lambda _: (),
 ) -> PreparedScan:
-    """Open everything that a scan needs.
+    """Put a scan together over a run that is open.
 
     Args:
-        run: the run beneath.
+        opened: the run.
         found: its settings, from `checked`.
         wanted: how the model is made.
         axes: of the files.
@@ -149,7 +155,6 @@ def prepare_scan(
         tell: takes a line that the user should know.
         words: of the command line.
         resumed: submaps of a scan that was killed, to go on from.
-        feed: brings browsers that give their cameras; None: there is no page.
         sinks_of: makes further sinks.
 
     Raises:
@@ -157,7 +162,6 @@ def prepare_scan(
         UnavailableError: a camera, a link or the folder cannot be had.
         DataError: the rig cannot be used.
     """
-    opened = open_run(run, found, tell, feed)
     if opened.core is None:
         raise _no_metres()
     camera = opened.camera

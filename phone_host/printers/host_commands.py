@@ -22,7 +22,11 @@ _ACTIONS: Final = {
 
 
 def host_command(text: str) -> str:
-    """Return the name of a command for the host, in small letters; empty: the line is none; `text`: a line of G-code, without comment and blanks around it."""
+    """Return the name of a command for the host, in small letters; empty: the line is none.
+
+    Args:
+        text: a line of G-code, without comment and blanks around it.
+    """
     found = _COMMAND.fullmatch(text)
     return found[1].lower() if found and text.isprintable() else ""
 

@@ -119,7 +119,15 @@ class PrintPath:
         self.start_moves = self.printer.moves
 
     def take(self, name: str, text: str) -> tuple[Place, ...]:
-        """Take a line: places that it reaches while it extrudes, its ends included; none: it extrudes nothing; `name`: its command, such as G1; `text`: the whole line."""
+        """Take a line.
+
+        Args:
+            name: its command, such as G1.
+            text: the whole line.
+
+        Returns:
+            Places that it reaches while it extrudes, its ends included; none: it extrudes nothing.
+        """
         places = self._nozzle.take(name, text)
         if places:
             (self.printer if self._is_custom else self.model).add(places)

@@ -324,7 +324,7 @@ def _with_figures(told: CalibrationResult, found: Calibration) -> CalibrationRes
     rectified_size = None if rectified is None else f"{rectified.width_px}x{rectified.height_px}"
     return replace(
         told,
-        views=tuple(_view(used) for used in found.used),
+        views=tuple(_view(used, is_rectified=found.obstacle is None) for used in found.used),
         rms_px=RmsErrors(rig.rms_left_px, rig.rms_right_px, rig.rms_stereo_px),
         vertical_error_px=VerticalError(float(px.mean()), float(np.percentile(px, 95)), float(px.max())),
         baseline_mm=_baseline_mm(rig),
@@ -350,10 +350,10 @@ def _with_figures(told: CalibrationResult, found: Calibration) -> CalibrationRes
     )
 
 
-def _view(used: Used) -> ViewErrors:
+def _view(used: Used, *, is_rectified: bool) -> ViewErrors:
     board = used.in_space
     bow_mm, sigma_mm = (each * 1e3 for each in board.bow_m)
-    errors = (used.left_px, used.right_px, used.vertical_px)
+    errors = (used.left_px, used.right_px, used.vertical_px if is_rectified else math.nan)
     return ViewErrors(used.name, *errors, board.miss, board.size, board.size_sigma, bow_mm, sigma_mm)
 
 

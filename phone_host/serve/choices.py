@@ -1,4 +1,4 @@
-"""The page's choices are options of `phone-host run` by name. They become a command line, and are read by what reads command lines."""
+"""The page's choices are options of `phone-host run` by name. They become requests, and are read by what reads command lines."""
 
 import argparse
 import os

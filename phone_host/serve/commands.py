@@ -212,7 +212,8 @@ class Commands:
             raise SettingsError("there is no calibration, so there are no metres", "calibrate, or name a rig.yaml")
         wanted = asked_scan(values)
         axes, out = axes_beside(request.depth.axes, wanted), new_place(page_folder(choices.get("out"), "scans"))
-        return prepare_scan(request, found, wanted, axes, out, tell=self._tell, feed=self.feed, sinks_of=sinks_of)
+        opened = open_run(request, found, self._tell, self.feed)
+        return prepare_scan(opened, found, wanted, axes, out, tell=self._tell, sinks_of=sinks_of)
 
     def question(self, choices: Choices) -> Question:
         """Return what the doctor is to look at."""

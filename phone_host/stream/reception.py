@@ -43,7 +43,6 @@ class Reception:
         account: the links' account so far.
         tail_known: whether the board has told the last account of this session.
         border: what decides whether frames are believed.
-        hello: the board's description of itself; None before the first contact.
         due_ns: when to call `tick` next even if nothing comes, ns; as of the last `tick`.
 
     Args:
@@ -60,7 +59,7 @@ class Reception:
         self._session = HostSession(host_id, [link.dialled for link in links])
         self._choice = LinkChoice(len(links))
         self._boot_id = ""
-        self.hello: BoardHello | None = None
+        self._hello: BoardHello | None = None
         self._flow = Flow()
         self._streamed_over: int | None = None
         self._refusals = Refusals()
@@ -76,6 +75,11 @@ class Reception:
     def refused(self, now_ns: int) -> BoardRefusal | None:
         """Return why the last board heard refuses this host; None if it does not, or is silent now."""
         return self._refusals.last(now_ns)
+
+    @property
+    def hello(self) -> BoardHello | None:
+        """The board's description of itself; None before the first contact."""
+        return self._hello
 
     @property
     def connected(self) -> bool:
@@ -168,8 +172,8 @@ class Reception:
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
-        if self.hello is not None:
-            self.handle(self._session.steer(later_ns % self.hello.camera.period_ns), now_ns)
+        if self._hello is not None:
+            self.handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
 
     def hold(self, locks: Locks) -> None:
         """Have the board's camera held like this, in this session and every later one."""
@@ -209,11 +213,11 @@ class Reception:
             _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
 
     def _grant(self, now_ns: int) -> None:
-        if self.hello is None:
+        if self._hello is None:
             return
         if (frames := self._sink.room()) is None:
             round_trip_ns = self._paced_round_trip_ns() if self._is_paced else None
-            frames = self._flow.credit(self._session.outstanding, self.hello.camera.period_ns, round_trip_ns)
+            frames = self._flow.credit(self._session.outstanding, self._hello.camera.period_ns, round_trip_ns)
         if frames and self.border.takes_frames:  # without a clock, frames could not be paired
             self.handle(self._session.grant(frames), now_ns)
 
@@ -318,7 +322,7 @@ class Reception:
                     self._choice.up(link, now_ns)
                 _LOG.info(event("link_down", link=tally.name, stuck=stuck))
             case session.OtherBoard(link, hello):
-                ours = self.hello
+                ours = self._hello
                 names = " and ".join(tally.name for tally in self.account.links)
                 if tally.frames or tally.lost or ours is None:  # it was right once: somebody has moved a cable
                     _LOG.warning(event("other_board", link=tally.name, camera=hello.camera.name))
@@ -333,7 +337,7 @@ class Reception:
     def _begin(self, accepted: session.Accepted, now_ns: int) -> None:
         hello, link = accepted.hello, accepted.link
         self._refusals.accepted()
-        self.hello = hello
+        self._hello = hello
         self._flow = Flow()
         self.tail_known = False
         self._choice.carries(link, now_ns)
@@ -363,8 +367,8 @@ class Reception:
 
     def _note_rung(self, rung: Rung) -> None:
         """Adopt the new rung of the board's camera."""
-        assert self.hello is not None
-        self.hello = replace(self.hello, camera=replace(self.hello.camera, period_ns=rung.period_ns), rung=rung)
+        assert self._hello is not None
+        self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
         self.account.current.rung = rung
         self._sink.change_period(rung.period_ns)
         fps = round(1e9 / rung.period_ns, 2)
@@ -377,8 +381,8 @@ class Reception:
         account.lost += lost
         tally.frames += 1
         tally.bytes += len(frame.payload)
-        assert self.hello is not None
-        arrival = Arrival(frame, link, account, self.hello.camera, now_ns)
+        assert self._hello is not None
+        arrival = Arrival(frame, link, account, self._hello.camera, now_ns)
         if (believed := self.border.admit(arrival)) is None:
             self._has_news = True
         else:
@@ -386,7 +390,7 @@ class Reception:
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
         """Pass a believed frame to the sink, if the sink wants it."""
-        assert self.hello is not None
+        assert self._hello is not None
         if (objection := self._sink.objection(frame)) is not None:
             self.account.current.disbelieved[objection] += 1
             return
@@ -394,7 +398,9 @@ class Reception:
         transit_ns = frame.received_ns - marks.sent_ns
         if self._is_choosing:
             self._choice.frame(link, transit_ns, frame.received_ns)
-        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, self.hello.camera.period_ns, frame.received_ns)
+        self._flow.arrived(
+            transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, frame.received_ns
+        )
         self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
         self.border.passed(message)
         self._sink.add_board(frame)

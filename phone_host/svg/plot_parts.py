@@ -40,12 +40,13 @@ DARK_COLOURS: Final = (2, 4, 5)
 LETTER_PX: Final = 8
 """Space for a letter of 12 px text, generous."""
 
-_COLOURS: Final = 8
+COLOURS: Final = 8
+"""Number of the colours that series take in turn."""
 
 
 def fill(number: int) -> str:
     """Return the attribute that gives something the colour of the thing with this number, 0 and up."""
-    return f'style="fill:var(--c{number % _COLOURS})"'
+    return f'style="fill:var(--c{number % COLOURS})"'
 
 
 def point(number: int, at_px: tuple[float, float], radius: float, title: str, opacity: str = "1") -> str:
@@ -60,7 +61,7 @@ def point(number: int, at_px: tuple[float, float], radius: float, title: str, op
     """
     x, y = at_px
     words, inside = f"<title>{escape(title)}</title>", f'fill-opacity="{opacity}" {fill(number)}'
-    match number // _COLOURS % 4:
+    match number // COLOURS % 4:
         case 0:
             return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" {inside}>{words}</circle>'
         case 1:
@@ -70,7 +71,7 @@ def point(number: int, at_px: tuple[float, float], radius: float, title: str, op
             half = 1.3 * radius
             return f'<path d="M{x - half:.1f} {y:.1f}l{half:.1f} {-half:.1f}l{half:.1f} {half:.1f}l{-half:.1f} {half:.1f}z" {inside}>{words}</path>'
         case _:
-            colour = f"stroke:var(--c{number % _COLOURS});stroke-width:{radius / 2:.1f};fill:none"
+            colour = f"stroke:var(--c{number % COLOURS});stroke-width:{radius / 2:.1f};fill:none"
             return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius}" style="{colour}">{words}</circle>'
 
 

@@ -65,8 +65,7 @@ def _scan_live(request: ScanRequest) -> tuple[ScanReport, int]:
     """Scan until stopped, until the number of pairs is reached, or until a stream ends; return the report, and the exit code of a sound model."""
     from phone_host.jobs.scan import open_scan  # noqa: PLC0415 - pictures need neither links nor cameras
 
-    scan = open_scan(request, sys.argv, _tell)
-    signals = StopSignals()
+    scan, signals = open_scan(request, sys.argv, _tell)
     try:
         ended = _followed(scan, signals)
     except BaseException:

@@ -11,6 +11,7 @@ from phone_host.recording.session_info import SessionInfo, skews_ms
 from phone_host.report.chart_view import dots_chart
 from phone_host.report.page_frame import document, section, table
 from phone_host.report.page_script import Script
+from phone_host.svg.plot_parts import COLOURS
 from phone_host.svg.plots import Quantity
 
 _LONGEST = 20
@@ -75,7 +76,7 @@ def _between(recorded: Recorded) -> str:
     return dots_chart(
         (ends_ns - zero_ns) / 1e9,
         *(
-            Quantity(label=topic, values_ns=np.where(numbers == number, between_ns, np.nan), colour=number)
+            Quantity(label=topic, values_ns=np.where(numbers == number, between_ns, np.nan), colour=number % COLOURS)
             for number, topic in enumerate(topics)
         ),
     )

@@ -57,6 +57,7 @@ def test_pairs_come_once_and_in_order_and_every_frame_is_accounted_for(source: s
         ended = host.run(lambda: False)
         counts = host.snapshot().counts
     assert ended is (EndReason.STREAM_ENDED if source.startswith("recording") else EndReason.PAIRS_REACHED)
+    assert seen
     for numbers in zip(*seen, strict=True):
         assert list(numbers) == sorted(set(numbers))
     if source == "recording at its pace":  # a busy machine may come too late for some

@@ -70,7 +70,7 @@ def test_images_spoiled_on_the_host_cost_only_their_own_pairs(tmp_path: Path) ->
     assert report["host_frames"]["spoiled"] >= 9
     [session] = report["sessions"]
     never_came = sum(session["dropped"].values()) + session["lost"]  # a busy machine's; they need no partner
-    assert report["frames"]["orphaned"]["no_partner"] >= 9 - never_came
+    assert 0 < 9 - never_came <= report["frames"]["orphaned"]["no_partner"]
 
 
 VERSIONS = pytest.mark.parametrize(

@@ -20,10 +20,10 @@ def misfit_svg(measured: Measured) -> str:
     )
     points = " ".join(f"{across.px(x):.1f},{up.px(y):.1f}" for x, y in zip(offsets_ms, misfits, strict=True))
     parts = [
-        axes(_SIZE_PX, up, "misfit", "time offset, ms") + ticks_below(_SIZE_PX, across),
+        axes(_SIZE_PX, up, measured.misfit, "time offset, ms") + ticks_below(_SIZE_PX, across),
         f'<rect {doubt} style="fill:var(--c4);fill-opacity:.15"/>',
         f'<path style="stroke:var(--c4);stroke-width:1.5" d="M{here_px:.1f} {up.start_px}V{up.end_px}"/>',
         f'<polyline style="stroke:var(--c5);stroke-width:1.5;fill:none" points="{points}"/>',
     ]
     found = f"{measured.method.value}: host minus board {found_ms:+.2f} \u00b1 {doubt_ms:.2f} ms"
-    return standalone(f"{found}; {measured.misfit}", (), svg(*_SIZE_PX, "misfit of each time offset", parts))
+    return standalone(found, (), svg(*_SIZE_PX, "misfit of each time offset", parts))

@@ -54,5 +54,17 @@ def test_help_shows_first_what_most_people_need() -> None:
             assert len(untitled._group_actions) <= 14, verb  # noqa: SLF001 - likewise
 
 
+def test_no_option_takes_an_empty_value_or_half_a_number() -> None:
+    """Also those in groups of the help are read by our readers, not by Python's own types, which take "", "1_0" and foreign digits."""
+    raw = [
+        f"{parser.prog} {action.dest}"
+        for make in PARSERS
+        for parser in (make(), *verbs_of(make()).values())
+        for action in options_of(parser)
+        if action.nargs != 0 and action.type in {None, str, int, float, Path}
+    ]
+    assert [name for name in raw if not name.endswith((" help", " version", " verb", " completion"))] == []
+
+
 if __name__ == "__main__":
     GOLDEN.write_text(current())
