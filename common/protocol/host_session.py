@@ -202,7 +202,7 @@ class HostSession:
         return [Outgoing(carrier.lanes[Lane.CONTROL], Credit(below_index))]
 
     def steer(self, later_ns: int) -> list[Output]:
-        """Ask the board's camera to expose later."""
+        """Ask the board's camera to expose later, by less than its period, ns."""
         carrier = self._carriage.carrier
         return [] if carrier is None else [Outgoing(carrier.lanes[Lane.CONTROL], Steer(later_ns))]
 

@@ -79,7 +79,14 @@ class BrowserBorder:
         self._sequence, self._dropped, self._changes = -1, 0, 0
 
     def judge(self, data: bytes, arrived_ns: int, clock: BrowserClock, asleep_ns: int) -> Believed | Disbelieved:
-        """Judge an image."""
+        """Judge an image.
+
+        Args:
+            data: the message as it came.
+            arrived_ns: when it came, host's clock, ns.
+            clock: the browser's.
+            asleep_ns: how long the host has slept since it booted, ns.
+        """
         image = read_frame(data)
         if isinstance(image, FrameFault):
             return Disbelieved(image)

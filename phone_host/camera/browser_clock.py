@@ -45,7 +45,7 @@ class BrowserClock:
         return 0 if estimate is None else estimate.round_trip_ns
 
     def asked(self, echo: EchoAsked, t1_ns: int, t2_ns: int) -> None:
-        """Note that an echo was answered."""
+        """Note that an echo came at `t1_ns` and was answered at `t2_ns`, host's clock, ns."""
         self._open[echo.number] = (echo, t1_ns, t2_ns)
         if len(self._open) > _MOST_OPEN:
             self._open.popitem(last=False)

@@ -127,7 +127,7 @@ def past_seconds(history: Sequence[Episode]) -> float:
 
 
 def told_past(history: Sequence[Episode], pairs: int, save_every: int) -> list[tuple[Diagnostic, str]]:
-    """Return the gravest of what stood for a while and has gone, each with one line that says so."""
+    """Return the gravest of what stood for a while and has gone, each with one line that says so. `save_every` 0: no pair was saved."""
     return [(item.concern, _line(item, pairs, save_every)) for item in past(history)[:_MOST_TOLD]]
 
 

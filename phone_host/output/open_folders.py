@@ -19,7 +19,12 @@ INNER: Final = re.compile(PAIR_NAMES)
 
 
 def way_to(folder: int, path: Path) -> Path:
-    """Return a path to an open folder; `folder`: its descriptor; `path`: the path where the system has none by descriptors."""
+    """Return a path to an open folder.
+
+    Args:
+        folder: its descriptor.
+        path: the path where the system has none by descriptors.
+    """
     way = Path(f"/proc/self/fd/{folder}")
     return way if way.exists() else path
 

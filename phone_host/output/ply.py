@@ -171,7 +171,11 @@ def packed_points(
 
 
 def require_one_size(cloud: CloudImage, colours: Image) -> None:
-    """Check that each point has a colour; `cloud`: (H, W, 3) float32, m; `colours`: (H, W) grey or (H, W, 3) BGR, uint8.
+    """Check that each point has a colour.
+
+    Args:
+        cloud: (H, W, 3) float32, m.
+        colours: (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
         ValueError: the two sizes differ, or one of the two has another shape.

@@ -128,7 +128,11 @@ def depth_picture(cloud: CloudImage) -> Image:
 
 
 def write_png(path: Path, image: Image) -> None:
-    """Write an image as PNG, whole or not at all; `path`: the file; `image`: (H, W) grey or (H, W, 3) BGR, uint8.
+    """Write an image as PNG, whole or not at all.
+
+    Args:
+        path: the file.
+        image: (H, W) grey or (H, W, 3) BGR, uint8.
 
     Raises:
         OSError: the file cannot be written.

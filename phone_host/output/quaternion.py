@@ -5,7 +5,11 @@ from numpy.typing import NDArray
 
 
 def quaternion_of(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return w, x, y, z of a rotation, w >= 0: the eigenvector of Bar-Itzhack's matrix (2000), which no angle divides by 0; `rotation`: (3, 3) float64."""
+    """Return w, x, y, z of a rotation, w >= 0: the eigenvector of Bar-Itzhack's matrix (2000), which no angle divides by 0.
+
+    Args:
+        rotation: (3, 3) float64.
+    """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
     matrix = np.array(
         [

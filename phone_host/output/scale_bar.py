@@ -55,7 +55,7 @@ class Tick:
 
 
 def ticks(low: float, high: float, place: Callable[[float], float], pitch: float) -> tuple[Tick, ...]:
-    """Choose round numbers that label a scale.
+    """Choose round numbers that label a scale, the roundest first.
 
     Args:
         low: least number on it; numbers up to 0 get no tick, except 0 itself where it is `low`.

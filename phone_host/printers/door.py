@@ -92,7 +92,7 @@ class PrinterDoor(Protocol):
         """
 
     def send(self, job: Job, wishes: Wishes, tell: Callable[[Progress], None]) -> Ended:
-        """Print something. It returns when that has ended.
+        """Print something, and `tell` several times a second how it goes. It returns when that has ended.
 
         Raises:
             TandemError: it cannot be printed, or the printer is gone.

@@ -70,7 +70,11 @@ class JournalEntry:
             part.replace(self._path)
 
     def close(self, *, is_reported: bool = True) -> None:
-        """Let the printer go; `is_reported`: whether whoever started the print knows how it ended: then the entry is removed, else the next start tells."""
+        """Let the printer go.
+
+        Args:
+            is_reported: whether whoever started the print knows how it ended: then the entry is removed, else the next start tells.
+        """
         for path in (self._path, self._path.with_suffix(".part")) if is_reported else ():
             with suppress(OSError):
                 path.unlink()

@@ -58,7 +58,12 @@ def is_long(text: str) -> bool:
 
 
 def patience_ns(text: str, usual_ns: int) -> int:
-    """Return how long the answer to a line is waited for, ns; `text`: of the line; `usual_ns`: for a line that takes no time, ns."""
+    """Return how long the answer to a line is waited for, ns.
+
+    Args:
+        text: of the line.
+        usual_ns: for a line that takes no time, ns.
+    """
     return LONG_NS if is_long(text) else usual_ns
 
 

@@ -298,7 +298,11 @@ def _cura_machine() -> Path:
 
 
 def facts_of(gcode: Path, most_characters: int = MOST_FOR_LINES) -> GcodeFacts:
-    """Read a file of G-code; `gcode`: the file; `most_characters`: that its lines may have.
+    """Read a file of G-code.
+
+    Args:
+        gcode: the file.
+        most_characters: that its lines may have.
 
     Raises:
         DataError: it is none, or cannot be read.

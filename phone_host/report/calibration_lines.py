@@ -55,7 +55,12 @@ def pairing_notes(files: ViewFiles) -> list[str]:
 
 
 def summary(report: CalibrationReport, out: Path) -> list[str]:
-    """Return the report as lines of text; `report`: what came of the pictures; `out`: the rig's file."""
+    """Return the report as lines of text.
+
+    Args:
+        report: what came of the pictures.
+        out: the rig's file.
+    """
     result = report.result
     if isinstance(result, DataError):
         return [*rejections(report.rejected), *_unwritten(report, out)]

@@ -82,7 +82,11 @@ def depth_picture(depth: NDArray[np.float32], near_m: float, far_m: float) -> Im
 
 
 def reduced(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Leave out rows and columns until a picture of the values is small enough; `values`: (H, W) float32."""
+    """Leave out rows and columns until a picture of the values is small enough.
+
+    Args:
+        values: (H, W) float32.
+    """
     height, width = values.shape
     size = _small_size(width, height)
     if size == (width, height):
@@ -91,7 +95,12 @@ def reduced(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def photograph(image: Image, most_px: int = MOST_PICTURE_PX) -> bytes:
-    """Make an image into a JPEG of at most `most_px` in width and height; `image`: grey or BGR; `most_px`: its larger side, px."""
+    """Make an image into a JPEG of at most `most_px` in width and height.
+
+    Args:
+        image: grey or BGR.
+        most_px: its larger side, px.
+    """
     height, width = image.shape[:2]
     size = _small_size(width, height, most_px)
     small = image if size == (width, height) else cv2.resize(image, size, interpolation=cv2.INTER_AREA)

@@ -42,7 +42,11 @@ def drift_values(drift: Drift | None) -> dict[str, object] | None:
 
 
 def stills_drift_values(drift: Drift | None) -> dict[str, object] | None:
-    """Return the object `drift` of `stereo`'s report.json for several pairs; None without a rig; `drift`: of the pairs, with their numbers, from 1 on, for seconds."""
+    """Return the object `drift` of `stereo`'s report.json for several pairs; None without a rig.
+
+    Args:
+        drift: of the pairs, with their numbers, from 1 on, for seconds.
+    """
     if drift is None:
         return None
     trend = drift.trend

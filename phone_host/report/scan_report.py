@@ -261,12 +261,22 @@ def scan_verdict(report: ScanReport) -> tuple[Headline, str]:
 
 
 def surface_error_sentence(error_m: float, scope: ErrorScope) -> str:
-    """State the expected error of a model's surface, without a full stop; `error_m`: median standard deviation of the surface's points, m; `scope`: what it covers."""
+    """State the expected error of a model's surface, without a full stop.
+
+    Args:
+        error_m: median standard deviation of the surface's points, m.
+        scope: what it covers.
+    """
     return f"Expected surface error: \u00b1{two_digits(error_m * 1e3)} mm ({scope.value})"
 
 
 def unseen_sentence(share: float, choice: UnseenSurface) -> str:
-    """Say how much of the surface no view measured, and what the files hold of it, without a full stop; `share`: 0..1; `choice`: what the files hold."""
+    """Say how much of the surface no view measured, and what the files hold of it, without a full stop.
+
+    Args:
+        share: 0..1.
+        choice: what the files hold.
+    """
     return f"{share_text(share)} was never in view and {unseen_words(choice)}"
 
 

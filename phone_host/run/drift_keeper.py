@@ -113,7 +113,7 @@ class DriftKeeper:
         return Moment(result, timed)
 
     def judge(self, moment: Moment, look: Examined, at_s: float) -> None:
-        """Take what was seen in a pair into account, and have the next pairs corrected."""
+        """Take what was seen in a pair into account, `at_s` after the start of the run, and have the next pairs corrected."""
         if moment.timed.before is None and not self._is_timeless:
             return  # without its motion, what moves would be taken for a turn
         found = sighting_of(self._core, moment.result.processed, look, moment.timed)

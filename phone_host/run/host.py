@@ -198,6 +198,9 @@ class Host:
             report: content of report.json.
             page: content of index.html; empty: none.
             replaces_earlier: whether the run is whole, so that an earlier run's results may be replaced by it.
+
+        Returns:
+            Whether all results were written.
         """
         overlay = "" if self._keeper is None else self._keeper.overlay
         self._files.close(report, page, self._cameras.text(), overlay, replaces_earlier=replaces_earlier)

@@ -74,6 +74,11 @@ class BudgetController:
     def add(self, total_ns: int, match_ns: int, now_ns: int) -> BudgetReason | None:
         """Take the times of a pair that was matched as `step` says; `step` may then be another.
 
+        Args:
+            total_ns: time of the whole pair, ns.
+            match_ns: the part of it that matching took, ns.
+            now_ns: monotonic, ns.
+
         Returns:
             Why `step` is another; None if it is the same.
         """

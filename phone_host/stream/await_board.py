@@ -85,7 +85,7 @@ def await_board(
     ready: Callable[[], bool],
     stop: Callable[[], bool] = lambda: False,
 ) -> bool:
-    """Wait until a board has delivered what the caller needs.
+    """Wait until a board has delivered what the caller needs: `ready` is asked several times a second.
 
     Returns:
         True if the board has delivered, False if `stop` ended the wait.

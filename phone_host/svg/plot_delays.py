@@ -110,7 +110,7 @@ class Compared:
 
 
 def compared(points: Sequence[Compared], width_px: int, height_px: int = 300) -> str:
-    """Plot predicted against measured, both logarithmic; on the line they are equal.
+    """Plot predicted against measured of at least one point, both logarithmic; on the line they are equal.
 
     Returns:
         An <svg> element.

@@ -89,13 +89,21 @@ def hit(x: float, y: float, width: float, height: float, title: str) -> str:
 
 
 def legend(labels: Sequence[tuple[str, int]]) -> str:
-    """Make a legend as an HTML list, which wraps in a narrow window; `labels`: names with their index into the palette, 0..7."""
+    """Make a legend as an HTML list, which wraps in a narrow window.
+
+    Args:
+        labels: names with their index into the palette, 0..7.
+    """
     items = "".join(f'<li><i style="background:var(--c{colour})"></i>{escape(name)}</li>' for name, colour in labels)
     return f'<ul class="legend">{items}</ul>'
 
 
 def point_legend(labels: Sequence[tuple[str, int]]) -> str:
-    """Make a legend for points: each name beside its mark; `labels`: names with their numbers, 0 and up."""
+    """Make a legend for points: each name beside its mark.
+
+    Args:
+        labels: names with their numbers, 0 and up.
+    """
     items = "".join(
         f'<li><svg viewBox="0 0 10 10" aria-hidden="true">{point(number, (5.0, 5.0), 3.6, name)}</svg>{escape(name)}</li>'
         for name, number in labels

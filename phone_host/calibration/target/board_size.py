@@ -117,7 +117,7 @@ def size_seen(grey: Image, way: int = _USUAL_WAY) -> Inner | None:
 
 
 def whole_size_seen(grey: Image) -> Inner | None:
-    """Return the inner corners of the chessboard in an image, if its white margin is seen on all four sides.
+    """Return the inner corners of the chessboard in an image, the larger count first, if its white margin is seen on all four sides.
 
     A board that reaches beyond the image, or that a hand covers, looks like a smaller one. On the side where it is cut there are more
     squares, a hand or nothing beside the outermost corners instead of a black-and-white row and then the margin.
@@ -253,7 +253,7 @@ def _area(size: Inner) -> int:
 
 
 def size_in_files(files: ViewFiles, most_pixels: int = MOST_PIXELS) -> Inner:
-    """Find out which chessboard the images show.
+    """Find out which chessboard the images show: its inner corners, the larger count first.
 
     Raises:
         DataError: the images show none, do not agree, or none of them is an image.

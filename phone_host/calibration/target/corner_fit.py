@@ -116,7 +116,7 @@ class _Equations:
 def fit_corners(
     grey: Image, start: Floats, along: Floats, down: Floats, most_share: float = _CHESSBOARD_SHARE
 ) -> FittedCorners:
-    """Fit corners of a board to an image.
+    """Fit corners of a board to an image; returns them in the same order.
 
     Args:
         grey: (H, W) uint8.

@@ -38,7 +38,11 @@ class Decimated:
 
 
 def decimated(solid: Solid, tolerance_m: float) -> Decimated:
-    """Leave out triangles that say nothing; `solid`: the mesh; `tolerance_m`: the new surface stays as near as this to the old one, m.
+    """Leave out triangles that say nothing.
+
+    Args:
+        solid: the mesh.
+        tolerance_m: the new surface stays as near as this to the old one, m.
 
     Raises:
         NoLibraryError: manifold3d is not installed.

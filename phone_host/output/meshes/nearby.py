@@ -78,7 +78,11 @@ class Grid:
         return np.asarray(pairs[pairs[:, 0] != pairs[:, 1]], np.int64)
 
     def near(self, points: Points) -> tuple[Indices, Indices]:
-        """Return all (point, triangle) of which the triangle's box meets the point's cell; `points`: (N, 3), mm."""
+        """Return all (point, triangle) of which the triangle's box meets the point's cell.
+
+        Args:
+            points: (N, 3), mm.
+        """
         cells = np.floor((points - self._origin) / self.cell).astype(np.int64)
         inside = ((cells >= 0) & (cells < 1 << _BITS)).all(axis=1)
         keys = _keys(np.where(inside[:, np.newaxis], cells, 0))

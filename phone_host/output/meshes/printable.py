@@ -142,7 +142,11 @@ _EDGES: Final = {
 
 
 def volume_mm3(corners: Points) -> float:
-    """Return what a closed mesh encloses; below zero if it is inside out; `corners`: (T, 3, 3), mm."""
+    """Return what a closed mesh encloses; below zero if it is inside out.
+
+    Args:
+        corners: (T, 3, 3), mm.
+    """
     middle = corners.reshape(-1, 3).mean(axis=0)
     a, b, c = np.moveaxis(corners - middle, 1, 0)
     return float((a * np.cross(b, c)).sum() / 6)
@@ -156,7 +160,12 @@ def _turned(corners: Points) -> list[Problem]:
 
 
 def bodies(points: int, triangles: Triangles) -> NDArray[np.int64]:
-    """Return the body of each triangle, (T,) numbers from 0: triangles that share a point are of one body; `points`: their number; `triangles`: (T, 3)."""
+    """Return the body of each triangle, (T,) numbers from 0: triangles that share a point are of one body.
+
+    Args:
+        points: their number.
+        triangles: (T, 3).
+    """
     label = np.arange(points)
     while True:
         least = label[triangles].min(axis=1)
@@ -266,7 +275,12 @@ def _size(corners: Points, printer: Printer) -> list[Problem]:
 
 
 def fit_of(size_mm: Points, bed_mm: tuple[float, float, float]) -> float:
-    """Return how many times as large it may be, and still fit, if need be turned by 90 degrees about z; `size_mm`: (3,) its extent, mm; `bed_mm`: what fits, mm."""
+    """Return how many times as large it may be, and still fit, if need be turned by 90 degrees about z.
+
+    Args:
+        size_mm: (3,) its extent, mm.
+        bed_mm: what fits, mm.
+    """
     x, y, z = (max(float(length), 1e-9) for length in size_mm)
     along, across, high = bed_mm
     return min(high / z, max(min(along / x, across / y), min(along / y, across / x)))

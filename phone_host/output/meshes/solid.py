@@ -154,7 +154,11 @@ def polygon_triangles(
 
 
 def require_triangles(name: str, triangles: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Leave out triangles of which two corners are one point; `name`: of the file, for errors; `triangles`: (T, 3).
+    """Leave out triangles of which two corners are one point.
+
+    Args:
+        name: of the file, for errors.
+        triangles: (T, 3).
 
     Raises:
         DataError: none is left.

@@ -31,7 +31,12 @@ _TEXT_HEAD: Final = 512
 
 
 def stl_bytes(solid: Solid, comment: str) -> bytes:
-    """Return a binary STL file in mm; `solid`: the mesh; `comment`: stands in its header, at most 80 ASCII letters."""
+    """Return a binary STL file in mm.
+
+    Args:
+        solid: the mesh.
+        comment: stands in its header, at most 80 ASCII letters.
+    """
     records = np.zeros(len(solid.triangles), _TRIANGLE)
     records["corners"] = solid.points_mm[solid.triangles]
     records["normal"] = _normals(records["corners"])

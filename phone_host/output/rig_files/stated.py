@@ -73,7 +73,11 @@ class StatedRig:
 
 
 def rotation_of(node: Node, matrix: Matrix) -> Matrix:
-    """Return the rotation next to a matrix that a file rounded; `node`: where it comes from, for errors; `matrix`: (3, 3).
+    """Return the rotation next to a matrix that a file rounded.
+
+    Args:
+        node: where it comes from, for errors.
+        matrix: (3, 3).
 
     Raises:
         DataError: it is no rotation, or mirrors.
