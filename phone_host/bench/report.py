@@ -94,7 +94,7 @@ def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis
             predictions=tuple(_checked(one) for one in analysis.checked),
             prediction_errors=BothErrors(_errors(analysis.held_out), _errors(analysis.queues)),
             not_run_settings=tuple(
-                NotRunSetting(one.interface, one.setting, *_said(one.figures)) for one in analysis.what_ifs
+                NotRunSetting(one.interface, one.setting, *_figures_or_reason(one.figures)) for one in analysis.what_ifs
             ),
             not_run=tuple(NotRun(str(interface), reason) for interface, reason in under.not_run),
         )
@@ -237,11 +237,13 @@ def _errors(errors: Errors) -> PredictionErrors:
 
 
 def _checked(one: Checked) -> Predicted:
-    queues, _ = _said(one.queues)
-    return Predicted(str(one.case.interface), one.case.images, _figures(one.measured), queues, *_said(one.predicted))
+    queues, _ = _figures_or_reason(one.queues)
+    return Predicted(
+        str(one.case.interface), one.case.images, _figures(one.measured), queues, *_figures_or_reason(one.predicted)
+    )
 
 
-def _said(predicted: Figures | Unknown) -> tuple[RunFigures | None, str | Absent]:
+def _figures_or_reason(predicted: Figures | Unknown) -> tuple[RunFigures | None, str | Absent]:
     return (None, predicted.reason) if isinstance(predicted, Unknown) else (_figures(predicted), ABSENT)
 
 

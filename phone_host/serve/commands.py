@@ -46,7 +46,7 @@ from phone_host.serve.choices import (
     without_depth,
     words_of,
 )
-from phone_host.serve.kept_choices import is_there, keep, kept
+from phone_host.serve.kept_choices import is_there, keep, load_choices
 from phone_host.serve.saved import new_place, page_folder
 from phone_host.serve.workshop import PrintWanted, asked_print
 from phone_host.settings import chosen_keys
@@ -134,7 +134,7 @@ class Commands:
     def __init__(self, file: Path, keys: str | None, tell: Callable[[str], None]) -> None:
         self._file, self._tell = file, tell
         self.feed: Final = BrowserFeed(_BROWSER_NS)
-        self.kept, others = kept(file)
+        self.kept, others = load_choices(file)
         self._fixed = {**others, **({"keys": keys} if keys else {})}
         self.keys: KeyFolder = chosen_keys(file if is_there(file) else None, keys)
         self.matchers: tuple[str, ...] = (*(name.value for name in usable_matchers()), *registered_names(MATCHERS))

@@ -31,7 +31,7 @@ def is_there(file: Path) -> bool:
         raise SettingsError(f"{file} cannot be read ({error.strerror})", "name another file with --config") from None
 
 
-def kept(file: Path) -> tuple[dict[str, str], dict[str, str]]:
+def load_choices(file: Path) -> tuple[dict[str, str], dict[str, str]]:
     """Read the choices.
 
     Args:
@@ -80,7 +80,7 @@ def keep(file: Path, choices: Choices, before: Choices | None = None) -> None:
             with suppress(OSError):  # network shares and FUSE may have no locks: the file is still replaced whole
                 fcntl.flock(folder, fcntl.LOCK_EX)  # until the folder is closed
             text = file.read_text(encoding="utf-8") if is_there(file) else ""
-            new = _with_choices(text, choices if before is None else _merged(kept(file)[0], before, choices))
+            new = _with_choices(text, choices if before is None else _merged(load_choices(file)[0], before, choices))
             if new == text:
                 return
             with replacing_in(folder, target.name, mode=0o600) as writing:  # a camera's address may hold a password

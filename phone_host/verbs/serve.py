@@ -103,7 +103,7 @@ def _opened_if_taken(settings: PageSettings, *, is_asked: bool) -> Iterator[None
         raise
 
 
-def told(state: PageState) -> str:
+def activity_text(state: PageState) -> str:
     """Return what goes on, in one line."""
     words = _WORDS[state.activity]
     if state.activity is Activity.RUNNING and state.run is not None:
@@ -135,12 +135,12 @@ class Status:
             change = f"{_WORDS[state.activity]} {state.trouble}"
             if change != self._last:
                 self._last = change
-                say(f"phone-host: {told(state)}", self._stream, flush=True)
+                say(f"phone-host: {activity_text(state)}", self._stream, flush=True)
             return
         if state.activity is Activity.CALIBRATING:  # its bars are drawn here
             self.clear()
             return
-        line = f"phone-host: {told(state)}"[: max(columns(self._stream) - 1, 20)]
+        line = f"phone-host: {activity_text(state)}"[: max(columns(self._stream) - 1, 20)]
         if line != self._last or not self._is_drawn:
             self._last, self._is_drawn = line, True
             self._stream.write(f"{_CLEAR}{line}")

@@ -41,7 +41,7 @@ from phone_host.stereo.rectifier import Rectifier
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.row_table import print_rows
-from tests.bench.scan_error_given import GIVEN, scan_given
+from tests.bench.scan_error_given import GIVEN, scan_sequence
 from tests.bench.scan_error_objects import ERROR_OBJECTS, ERROR_RIGS, error_scene
 from tests.support.surface_coverage import Coverage, coverage
 
@@ -115,14 +115,14 @@ def _row(kind: Kind, thing: str, scene: ObjectScene, pairs: Sequence[Processed])
         return np.minimum(off, np.abs(points[:, 2])) if kind is Kind.FREE else off
 
     found = coverage(model, distance, None if kind is Kind.MAT else _start(scan, scene), _AROUND_M)
-    return _told(scan, model, found, kind=kind.value, thing=thing, seed=scene.setting.seed)
+    return _row_of(scan, model, found, kind=kind.value, thing=thing, seed=scene.setting.seed)
 
 
 def _given_row(name: str, data: Path) -> Row:
-    return _told(*scan_given(name, data), kind="given", thing=name, seed=0)
+    return _row_of(*scan_sequence(name, data), kind="given", thing=name, seed=0)
 
 
-def _told(scan: Scan, model: ScanModel, found: Coverage, *, kind: str, thing: str, seed: int) -> Row:
+def _row_of(scan: Scan, model: ScanModel, found: Coverage, *, kind: str, thing: str, seed: int) -> Row:
     return Row(
         kind=kind,
         thing=thing,

@@ -63,7 +63,7 @@ def _of_room(data: Path) -> tuple[Clip, list[Processed]]:
     return clip, pairs
 
 
-def scan_given(name: str, data: Path) -> tuple[Scan, ScanModel, Coverage]:
+def scan_sequence(name: str, data: Path) -> tuple[Scan, ScanModel, Coverage]:
     """Scan a sequence.
 
     Args:

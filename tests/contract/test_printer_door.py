@@ -119,7 +119,7 @@ def test_a_pause_is_passed_on_and_ended(kind: str, tmp_path: Path) -> None:
 
 
 @every_door
-def test_a_file_that_leaves_heaters_on_is_cooled_or_told(kind: str, tmp_path: Path) -> None:
+def test_a_file_that_leaves_heaters_on_is_cooled_or_noted(kind: str, tmp_path: Path) -> None:
     """Where the printer cannot be asked to cool, one note says that it stays hot."""
     hot = [line for line in cube(100) if line not in {"M104 S0", "M140 S0", "M84"}]
     with stand_of(kind, tmp_path) as stand:

@@ -32,7 +32,7 @@ from phone_host.serve.saved import keep_newest
 from phone_host.serve.scanning import Scanned, Scanning, page_words
 from phone_host.serve.shelf import PageSink, Shelf
 from phone_host.serve.steps import steps
-from phone_host.verbs.serve import Status, told
+from phone_host.verbs.serve import Status, activity_text
 from phone_host.web.source import Activity, PageState, ScanState, StepName, Surface
 from tests.support.run_snapshots import run
 from tests.support.samples import LEDGER
@@ -320,7 +320,10 @@ def test_the_terminal_tells_what_goes_on() -> None:
         "phone-host: running: 3 pairs",
         "phone-host: ready",
     ]
-    assert told(replace(ready, trouble=Diagnostic("no rig", "calibrate", Severity.FAIL))) == "ready; no rig: calibrate"
+    assert (
+        activity_text(replace(ready, trouble=Diagnostic("no rig", "calibrate", Severity.FAIL)))
+        == "ready; no rig: calibrate"
+    )
 
 
 @pytest.mark.parametrize("weakness", Weakness)
@@ -357,7 +360,9 @@ def test_a_scan_is_told_while_it_goes_on_and_afterwards(tmp_path: Path) -> None:
         assert state() == ScanState(words="waiting for the first pair", options={"voxel": "2mm", "box": ""})
         scanning.crop("1000x1000x1000@500,500,500")
         assert scanning.surface(0, 10) == Surface(7, ())
-        assert told(PageState(activity=Activity.SCANNING, scan=state())) == "scanning: waiting for the first pair"
+        assert (
+            activity_text(PageState(activity=Activity.SCANNING, scan=state())) == "scanning: waiting for the first pair"
+        )
     ended = state()
     assert ended is not None
     assert "ended without a result" in ended.words

@@ -10,7 +10,7 @@ from phone_host.jobs.run_request import RunRequest
 from phone_host.output.axes import Axes
 from phone_host.serve.choices import choices_of, request_of, shown_words, with_changes, without_depth, words_of
 from phone_host.serve.commands import Commands
-from phone_host.serve.kept_choices import keep, kept
+from phone_host.serve.kept_choices import keep, load_choices
 from phone_host.serve.page import address_of, page_settings
 from tests.support import requests
 
@@ -51,12 +51,12 @@ def test_what_is_no_option_of_a_run_cannot_be_set(changes: dict[str, str]) -> No
 def test_choices_are_kept_as_settings_and_beside_them(tmp_path: Path) -> None:
     """Settings become keys that `run --config` reads, other options a table of the page; keys of the program are not the page's."""
     file = tmp_path / "new" / "host.toml"
-    assert kept(file) == ({}, {})
+    assert load_choices(file) == ({}, {})
     choices = {"link": "tcp://a:1", "tolerance": "5ms", "interpolate": "yes", "near": "300"}
     keep(file, choices)
     assert file.stat().st_mode & 0o777 == 0o600
     file.write_text('keys = "k"  # mine\n' + file.read_text())
-    assert kept(file) == ({**choices, "tolerance": "5.0"}, {"keys": "k"})
+    assert load_choices(file) == ({**choices, "tolerance": "5.0"}, {"keys": "k"})
     keep(file, {"near": "200"})
     assert file.read_text() == 'keys = "k"  # mine\n\n[page]\nnear = "200"\n'
     keep(file, {"near": "200"})
@@ -70,7 +70,7 @@ def test_a_choice_is_kept_beside_one_that_another_hand_spoiled(tmp_path: Path) -
     file = tmp_path / "host.toml"
     file.write_text('[page]\nnear = "1"\n')
     keep(file, {"camera": "replay:y"}, {"camera": "replay:x"})
-    assert kept(file) == ({"camera": "replay:y", "near": "1"}, {})
+    assert load_choices(file) == ({"camera": "replay:y", "near": "1"}, {})
 
 
 def test_the_command_of_a_scan_has_the_choices_that_scan_takes(tmp_path: Path) -> None:

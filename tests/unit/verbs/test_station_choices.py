@@ -8,7 +8,7 @@ import pytest
 from common.diagnostic import Diagnostic, Severity
 from common.errors import SettingsError
 from phone_host.serve.commands import Commands
-from phone_host.serve.kept_choices import kept
+from phone_host.serve.kept_choices import load_choices
 from phone_host.serve.station import Station
 from phone_host.web.source import Command, Do
 from tests.support.pictures import jpeg
@@ -47,4 +47,4 @@ def test_what_is_set_at_the_same_moment_is_all_kept(tmp_path: Path) -> None:
     with ThreadPoolExecutor(len(setting)) as threads:
         assert {answer.words for answer in threads.map(station.command, setting)} == {"set"}
     assert station.state().settings == wanted
-    assert kept(file)[0].keys() == wanted.keys()
+    assert load_choices(file)[0].keys() == wanted.keys()
