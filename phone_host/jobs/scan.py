@@ -12,6 +12,7 @@ from common.program.request import read_request, usual_values
 from common.program.settings import Resolved, log_level
 from common.program.signals import StopSignals
 from common.protocol.message import Pacing
+from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.jobs.output_folders import (
@@ -128,8 +129,25 @@ def open_scan(
     _require(request, found.values)
     resumed = resumed_of(request, tell)
     logs.set_up(log_level(found.values.log_level))
-    opened, signals = open_run(run, found, tell), StopSignals()
+    opened, signals = open_metric_run(run, found, tell), StopSignals()
     return prepare_scan(opened, found, wanted, axes, request.out, tell=tell, words=words, resumed=resumed), signals
+
+
+def open_metric_run(
+    run: RunRequest,
+    found: Resolved[PhoneHostSettings],
+    tell: Callable[[str], None],
+    feed: BrowserFeed | None = None,
+) -> Opened:
+    """Open the run beneath a scan, as `open_run` does.
+
+    Raises:
+        SettingsError: it would give no depth in metres.
+    """
+    opened = open_run(run, found, tell, feed)
+    if opened.core is None:
+        raise _no_metres()
+    return opened
 
 
 def prepare_scan(
@@ -147,7 +165,7 @@ def prepare_scan(
     """Put a scan together over a run that is open.
 
     Args:
-        opened: the run.
+        opened: the run, from `open_metric_run`.
         found: its settings, from `checked`.
         wanted: how the model is made.
         axes: of the files.
@@ -158,12 +176,9 @@ def prepare_scan(
         sinks_of: makes further sinks.
 
     Raises:
-        SettingsError: options contradict each other, or give no depth in metres.
+        SettingsError: options contradict each other.
         UnavailableError: a camera, a link or the folder cannot be had.
-        DataError: the rig cannot be used.
     """
-    if opened.core is None:
-        raise _no_metres()
     camera = opened.camera
     is_replay = isinstance(camera, Playback)
     is_demanded = (camera.pacing if isinstance(camera, Playback) else camera.description.pacing) is Pacing.DEMAND

@@ -26,7 +26,7 @@ from phone_host.jobs.calibrate.pictures import calibrate_pictures, require_rig_p
 from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.run import PreparedRun, open_run
 from phone_host.jobs.run_request import RunRequest, checked
-from phone_host.jobs.scan import PreparedScan, SinksOf, prepare_scan
+from phone_host.jobs.scan import PreparedScan, SinksOf, open_metric_run, prepare_scan
 from phone_host.jobs.scan_request import ScanRequest, axes_beside
 from phone_host.jobs.stereo_core import refuse_rejected
 from phone_host.model import Verdict
@@ -212,7 +212,7 @@ class Commands:
             raise SettingsError("there is no calibration, so there are no metres", "calibrate, or name a rig.yaml")
         wanted = asked_scan(values)
         axes, out = axes_beside(request.depth.axes, wanted), new_place(page_folder(choices.get("out"), "scans"))
-        opened = open_run(request, found, self._tell, self.feed)
+        opened = open_metric_run(request, found, self._tell, self.feed)
         return prepare_scan(opened, found, wanted, axes, out, tell=self._tell, sinks_of=sinks_of)
 
     def question(self, choices: Choices) -> Question:
