@@ -14,8 +14,7 @@ from common import now
 from common.camera.base import Camera, CameraHealth, CameraState, Ended, Skipped, Spoiled, held_locks, lockable
 from common.errors import ProtocolError
 from common.frame import Frame
-from common.link.base import Broken, Garbage, Link, Packet, SendResult
-from common.link.several import SeveralLinks
+from common.link.base import Broken, Garbage, Link, Packet, SendResult, SeveralLinks
 from common.link.waiter import Waiter
 from common.program.logs import event
 from common.protocol.board_session import BoardSession

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from common.camera.v4l2_controls import Control
-from common.camera.v4l2_device import Device, Identity, capture_nodes
+from common.camera.v4l2_device import Device, Identity, capture_nodes, serial_number
 from common.camera.v4l2_formats import PREFERENCE, FormatOffer, Rates, rate_text
-from common.camera.v4l2_serial import serial_number
 from common.errors import UnavailableError
 
 _KNOWN = {letters: kind.value for letters, kind in PREFERENCE}

@@ -10,8 +10,8 @@ from common.camera.factory import parse_camera
 from common.errors import SettingsError
 from common.keys import SERVICE_FOLDER, KeyFolder, default_folder
 from common.link.factory import parse_link
-from common.program.declaration import setting
 from common.program.quantities import frames_per_second, seconds
+from common.program.request import setting
 from common.program.settings import Resolved, log_level, resolve
 from common.value import value
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from common.imagesize.head import MEGAPIXEL, MOST_PIXELS
-from common.program.declaration import setting
 from common.program.quantities import milliseconds
+from common.program.request import setting
 
 _USUAL_MEGAPIXELS: Final = MOST_PIXELS // MEGAPIXEL
 MAX_MEGAPIXELS_HELP: Final = f"refuse larger images before decoding them, in megapixels (default {_USUAL_MEGAPIXELS})"

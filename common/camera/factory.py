@@ -5,19 +5,54 @@ Every kind takes the options `rotate` and `flip`. They are read here; no kind se
 Other packages register cameras as entry points of the group `tandemscan.cameras`; the name is the URI's scheme in lower case. The entry point is
 a callable that takes one CameraRequest, opens the camera and returns a `common.camera.base.Camera`. It raises a SettingsError for an unusable
 option, and an UnavailableError for a device that cannot be had.
+
+The images stay as the camera gives them. Whoever decodes them turns them.
 """
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, cast
 from urllib.parse import parse_qsl
 
 from common.camera.base import Camera
 from common.camera.options import EXAMPLE, without_options
-from common.camera.turned import turned
 from common.errors import SettingsError
-from common.orientation import ORIENTING, Orientation, orientation_of
+from common.orientation import ORIENTING, UPRIGHT, Orientation, orientation_of
 from common.program.extensions import make_registered, named, registered_names
+from common.protocol.message import CameraDescription
 from common.value import value
+
+
+class TurnedCamera:
+    """Passes everything on to the camera itself, whatever its kind offers, except its description.
+
+    Args:
+        camera: the camera, open.
+        orientation: how it is mounted.
+    """
+
+    def __init__(self, camera: Camera, orientation: Orientation) -> None:
+        self._camera = camera
+        self._orientation = orientation
+
+    @property
+    def description(self) -> CameraDescription:
+        """See Camera."""
+        return replace(self._camera.description, orientation=self._orientation)
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the camera offers
+        return getattr(self._camera, name)
+
+
+def turned(camera: Camera, orientation: Orientation) -> Camera:
+    """Return a camera whose description tells its orientation.
+
+    Args:
+        camera: an open camera.
+        orientation: how it is mounted.
+    """
+    return camera if orientation == UPRIGHT else cast("Camera", TurnedCamera(camera, orientation))
+
 
 _CAMERAS: Final = "tandemscan.cameras"
 
@@ -55,7 +90,7 @@ class _Kind:
 
 
 _KINDS: Final = {
-    "replay": _Kind("common.camera.replay_uri:replay_settings", "common.camera.replay_uri:open_replay"),
+    "replay": _Kind("common.camera.recorded:replay_settings", "common.camera.recorded:open_replay"),
     "v4l2": _Kind("common.camera.v4l2_uri:v4l2_settings", "common.camera.v4l2:V4l2Camera"),
 }
 

@@ -14,14 +14,12 @@ from typing import Final
 
 from common.camera.base import CameraHealth, Grab, Mode, Offers
 from common.camera.life import NEVER_NS, Life, LifeSettings, Loss, Standing, Step, Unwanted
-from common.camera.restart_timing import RestartTiming
 from common.camera.v4l2_controls import to_axis, to_locks
 from common.camera.v4l2_device import find_camera
 from common.camera.v4l2_formats import Wanted
 from common.camera.v4l2_ring import RING_BUFFERS
-from common.camera.v4l2_stamps import RateMeter, rate_remedy
+from common.camera.v4l2_stamps import RateMeter, RestartTiming, Tally, rate_remedy
 from common.camera.v4l2_stream import Stream, V4l2Settings
-from common.camera.v4l2_tally import Tally
 from common.errors import TandemError, UnavailableError
 from common.frame import Frame
 from common.program.logs import event

@@ -14,9 +14,33 @@ from typing import Final, Self
 
 from common.camera import v4l2_abi as abi
 from common.camera.v4l2_controls import Control
-from common.camera.v4l2_formats import FormatOffer, Rates, SizeRange
+from common.camera.v4l2_formats import FormatOffer, PixelFormatSet, Rates, SizeRange
 from common.errors import TakenError, UnavailableError
 from common.value import value
+
+_CLASS: Final = Path("/sys/class/video4linux")
+_MOST_BYTES: Final = 1024
+"""A USB string has at most 126 letters (USB 2.0, 9.6.7)."""
+
+
+def serial_number(node: Path, folder: Path = _CLASS) -> str:
+    """Return the serial number of the USB device behind a video node; empty if it has none, or is no USB device.
+
+    Many cameras have none, and some models have the same in every camera.
+
+    Args:
+        node: the node or a link to it.
+        folder: the class folder of video devices in sysfs; `NAME/device` in it is the USB interface, whose parent is the device.
+    """
+    try:
+        device = (folder / node.resolve().name / "device").resolve().parent
+        if not (device / "idVendor").exists():
+            return ""
+        with (device / "serial").open("rb") as file:
+            return file.read(_MOST_BYTES).decode("utf-8", "replace").strip()
+    except OSError:
+        return ""
+
 
 _BY_ID: Final = Path("/dev/v4l/by-id")
 _BY_PATH: Final = Path("/dev/v4l/by-path")
@@ -45,23 +69,6 @@ class Identity:
         """Whether the node delivers images that can be streamed (a webcam's second node delivers metadata)."""
         wanted = abi.CAP_VIDEO_CAPTURE | abi.CAP_STREAMING
         return self.capabilities & wanted == wanted
-
-
-@value(kw_only=True)
-class PixelFormatSet:
-    """The format that the driver actually set.
-
-    Attributes:
-        letters: the format's four letters.
-        size_px: (width, height), px.
-        row_bytes: distance from one row to the next, bytes; 0 for compressed formats.
-        image_bytes: maximum size of one image, bytes.
-    """
-
-    letters: str
-    size_px: tuple[int, int]
-    row_bytes: int
-    image_bytes: int
 
 
 def ioctl(fd: int, request: int, argument: ctypes.Structure | ctypes.c_int) -> None:

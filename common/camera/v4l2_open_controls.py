@@ -6,7 +6,7 @@ import logging
 from common.camera import v4l2_abi as abi
 from common.camera.v4l2_controls import Axis, ControlPlan, ControlWishes, Step, lower_qualities
 from common.camera.v4l2_device import Device
-from common.camera.v4l2_tally import Tally
+from common.camera.v4l2_stamps import Tally
 from common.program.logs import event
 
 _LOG = logging.getLogger(__name__)

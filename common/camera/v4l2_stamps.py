@@ -1,14 +1,22 @@
-"""From a kernel stamp to the exposure mid-point, and the measured frame rate. Values only: no device or clock is read here.
+"""From a kernel stamp to the exposure mid-point, the measured frame rate, and restarts at a wanted phase. Values only: no device or clock is read here.
 
 Two flags of a stamp say which clock it is on and which moment it means (V4L2 specification, "Buffer flags"). uvcvideo sets "start of exposure" but
 stamps the arrival of the frame's first packet, which comes after the sensor has been read out. So its flag is not believed.
+
+A webcam whose sensor runs only while it streams takes its first exposure a fixed time after the start. On a loaded board
+single stamps and single starts are tens of ms late, so no figure here rests on one of them.
 """
 
+import math
 from collections import deque
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from enum import Enum, auto
+from statistics import median
 from typing import Final
 
 from common.camera import v4l2_abi as abi
+from common.frame import FrameFault
 from common.value import value
 
 _PLAUSIBLE_AGE_NS: Final = 2_000_000_000
@@ -159,3 +167,85 @@ class RateMeter:
         """Whether the camera's period, over a full window, is more than 10 % off the nominal one."""
         period_ns = self.period_ns if len(self._periods_ns) == _RATE_WINDOW else None
         return period_ns is not None and abs(period_ns - nominal_ns) > _RATE_TOLERANCE * nominal_ns
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counts that outlive the device. `stamps` is the clock named by the last frame's flags; None before the first frame."""
+
+    grabs: int = 0
+    missed: int = 0
+    distrusted: int = 0
+    refused: int = 0
+    faults: dict[FrameFault, int] = field(default_factory=dict)
+    stamps: StampClock | None = None
+    rate: RateMeter = field(default_factory=RateMeter)
+
+    def number(self) -> int:
+        """The sequence number of the next grab."""
+        self.grabs += 1
+        return self.grabs - 1
+
+
+_FRAMES: Final = 15
+_STARTS: Final = 5
+"""Each phase is the median of this many frames, the latency the median of this many starts."""
+
+
+def typical_phase(moments_ns: Sequence[int], period_ns: int) -> int:
+    """Return a moment at the phase that most of the moments share.
+
+    Args:
+        moments_ns: at least one, ns; the last is near the result.
+        period_ns: time between two exposures, > 0.
+    """
+    last_ns, half_ns = moments_ns[-1], period_ns // 2
+    # The median is taken around the circular mean: around a moment that is half a period off, the others would lie at both ends.
+    turns = [math.tau * ((moment_ns - last_ns) % period_ns) / period_ns for moment_ns in moments_ns]
+    mean = math.atan2(math.fsum(map(math.sin, turns)), math.fsum(map(math.cos, turns)))
+    middle_ns = last_ns + round(mean / math.tau * period_ns)
+    offs_ns = ((moment_ns - middle_ns + half_ns) % period_ns - half_ns for moment_ns in moments_ns)
+    return middle_ns + round(median(offs_ns))
+
+
+class RestartTiming:
+    """Learns from the stamps of a camera's frames how long after a start it exposes."""
+
+    def __init__(self) -> None:
+        self._started_ns = 0
+        self._first: list[int] = []
+        self._recent: deque[int] = deque(maxlen=_FRAMES)
+        self._latencies: deque[int] = deque(maxlen=_STARTS)
+
+    def started(self, now_ns: int) -> None:
+        """Take note of a start at `now_ns`."""
+        self._started_ns = now_ns
+        self._first.clear()
+        self._recent.clear()
+
+    def exposed(self, stamps_ns: Iterable[int]) -> None:
+        """Take note of the middles of exposures, oldest first, ns on the clock of the start."""
+        for stamp_ns in stamps_ns:
+            self._recent.append(stamp_ns)
+            if len(self._first) < _FRAMES:
+                self._first.append(stamp_ns)
+
+    def start_for(self, later_ns: int, earliest_ns: int, period_ns: int) -> int | None:
+        """Return when to start the camera again so that it exposes `later_ns` later within its period.
+
+        Call it once for each start: the latency of the stream that ends here is added to those of earlier starts.
+
+        Args:
+            later_ns: by how much later, in [0, period_ns).
+            earliest_ns: no start before this moment.
+            period_ns: time between two exposures, > 0.
+
+        Returns:
+            The first such moment; None while this stream has shown no frame.
+        """
+        if not self._first:
+            return None
+        self._latencies.append(typical_phase(self._first, period_ns) - self._started_ns)
+        latency_ns = typical_phase(self._latencies, period_ns)
+        start_ns = typical_phase(self._recent, period_ns) + later_ns - latency_ns
+        return earliest_ns + (start_ns - earliest_ns) % period_ns

@@ -12,9 +12,12 @@ from common import now
 from common.camera import v4l2_abi as abi
 from common.camera.base import Grab, Skipped, Spoiled
 from common.camera.v4l2_controls import ControlWishes
-from common.camera.v4l2_device import Device, PixelFormatSet, taken
+from common.camera.v4l2_device import Device, serial_number, taken
 from common.camera.v4l2_formats import (
     Choice,
+    Packing,
+    PixelFormatSet,
+    SendPart,
     Wanted,
     choose,
     choose_rate,
@@ -24,11 +27,10 @@ from common.camera.v4l2_formats import (
     smaller_sizes,
 )
 from common.camera.v4l2_open_controls import OpenControls
-from common.camera.v4l2_pack import Packing, SendPart
 from common.camera.v4l2_ring import Filled, Ring
-from common.camera.v4l2_serial import serial_number
 from common.camera.v4l2_stamps import (
     StampSource,
+    Tally,
     Timing,
     estimated_readout_ns,
     exposure_midpoint_ns,
@@ -36,7 +38,6 @@ from common.camera.v4l2_stamps import (
     stamp_clock,
     stamp_source,
 )
-from common.camera.v4l2_tally import Tally
 from common.camera_identity import CameraIdentity, identity_of
 from common.errors import UnavailableError
 from common.frame import Frame, FrameFault, PixelFormat, find_fault

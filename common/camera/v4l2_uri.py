@@ -6,8 +6,7 @@ from typing import Final
 
 from common.camera.options import TRUTHS, OptionReader, exact, milliseconds, rate
 from common.camera.v4l2_controls import Axis, ControlWishes, PowerLine
-from common.camera.v4l2_formats import Wanted
-from common.camera.v4l2_pack import SendPart
+from common.camera.v4l2_formats import SendPart, Wanted
 from common.camera.v4l2_stream import V4l2Settings
 from common.frame import PixelFormat
 

@@ -8,11 +8,10 @@ from typing import Final
 
 from common import now
 from common.camera.factory import open_camera, parse_camera, parse_orientation
-from common.camera.v4l2_device import Device, capture_nodes, lasting_name, video_nodes
+from common.camera.v4l2_device import Device, capture_nodes, lasting_name, serial_number, video_nodes
 from common.camera.v4l2_formats import Wanted, choose
-from common.camera.v4l2_serial import serial_number
+from common.camera.v4l2_stamps import Tally
 from common.camera.v4l2_stream import Stream, V4l2Settings
-from common.camera.v4l2_tally import Tally
 from common.diagnostic import Diagnostic, Severity
 from common.doctor import machine
 from common.doctor.access import Account, Node, check_access

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from common.frame import FrameFault, SpoiledImageError
-from common.imagesize.exif import EXIF_START, exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length
+from common.imagesize.tiff import EXIF_START, exif_orientation
 from common.orientation import UPRIGHT, Orientation
 
 SOI: Final = b"\xff\xd8"

@@ -4,8 +4,8 @@ import struct
 from typing import Final
 
 from common.frame import FrameFault, SpoiledImageError
-from common.imagesize.exif import exif_orientation
 from common.imagesize.head import COPY_AGAIN, ImageHead, ImageKind, check_length, size_text
+from common.imagesize.tiff import exif_orientation
 from common.orientation import UPRIGHT, Orientation
 
 PNG_START: Final = b"\x89PNG\r\n\x1a\n"

@@ -26,7 +26,7 @@ _TRANSPORTS: Final = {
     "tcp": "common.link.zeromq_opener:open_zeromq",
     "ipc": "common.link.zeromq_opener:open_zeromq",
     "serial": "common.link.serial:open_serial",
-    "rfcomm": "common.link.rfcomm_opener:open_rfcomm",
+    "rfcomm": "common.link.rfcomm:open_rfcomm",
 }
 
 

@@ -14,12 +14,19 @@ from common import now
 from common.errors import UnavailableError
 from common.frame import Buffer
 from common.keys import KeyFolder, OwnKey
-from common.link import gate
 from common.link.base import Broken, Garbage, Incoming, Packet, SendResult
-from common.link.dialled import Dialled
-from common.link.ipc import check_folder, check_peer, check_socket, let_in, trusted_users
 from common.link.waiter import Inbox
-from common.link.zeromq_address import explained, free_path, plain_endpoint
+from common.link.zeromq_address import (
+    check_folder,
+    check_peer,
+    check_socket,
+    explained,
+    free_path,
+    let_in,
+    plain_endpoint,
+    trusted_users,
+)
+from common.link.zeromq_socket import Dialled, bind_gated
 from common.peers import Peer
 from common.protocol.message import Lane
 from common.protocol.wire import MAX_HEADER_BYTES, MAX_PAYLOAD_BYTES
@@ -161,7 +168,7 @@ class ZeroMqListener(_AlwaysReady):
         self.router.setsockopt(zmq.ROUTER_MANDATORY, 1)  # report a vanished host instead of swallowing its frames
         before = os.umask(0o177)  # an ipc path is for its owner only
         try:
-            self._gate = gate.bind(self.router, address)
+            self._gate = bind_gated(self.router, address)
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
             raise explained(address, error, "stop what listens there, or choose another with --link") from None

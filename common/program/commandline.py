@@ -3,28 +3,81 @@
 import argparse
 import contextlib
 import errno
+import io
 import itertools
 import os
 import re
 import signal
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from common.errors import TandemError
 from common.plain_text import printable
 from common.program import interrupts
+from common.program.interrupts import forget_terminal
 from common.program.invocation import as_found
 from common.program.out_of_memory import is_out_of_memory, remedy_of, words_of
 from common.program.packages import package_error
 from common.program.quantities import decimal_number, whole_number
-from common.program.streams import mend_streams
 from common.program.terminal import fitted
 from common.versions import all_versions
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
+
+_STANDARD: Final = (0, 1, 2)
+
+
+def mend_streams() -> None:
+    """Open what is closed, and let every letter be written.
+
+    A closed descriptor (`>&-`) would go to the next file that is opened, and what native code prints would end up in it. What is written to
+    such a stream is lost, as its caller wanted. A letter that the terminal's encoding does not have is written as its code.
+    """
+    for descriptor in _STANDARD:
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest free one: this
+    sys.stdin = sys.stdin or open(0, closefd=False)  # noqa: SIM115 - a descriptor, for the whole process
+    sys.stdout = sys.stdout or open(1, "w", closefd=False)  # noqa: SIM115
+    sys.stderr = sys.stderr or open(2, "w", closefd=False)  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
+    if isinstance(sys.stderr, io.TextIOWrapper) and not isinstance(sys.stderr, _Stderr) and sys.stderr.isatty():
+        sys.stderr = _Stderr(
+            sys.stderr.buffer, encoding=sys.stderr.encoding, errors=sys.stderr.errors, line_buffering=True
+        )
+
+
+class _Stderr(io.TextIOWrapper):
+    """Messages to a terminal. Once that is closed they are lost: a bar that cannot be drawn must not end the work that it shows."""
+
+    def write(self, text: str, /) -> int:
+        """Write, as every stream; a terminal that is gone takes everything."""
+        try:
+            return super().write(text)
+        except OSError as error:
+            self._forget(error)
+            return len(text)
+
+    def flush(self) -> None:
+        """Flush, likewise."""
+        try:
+            super().flush()
+        except OSError as error:
+            self._forget(error)
+
+    def _forget(self, error: OSError) -> None:
+        if error.errno != errno.EIO:
+            raise error
+        forget_terminal()
+
 
 INTERRUPTED: Final = interrupts.INTERRUPTED
 CHECK_FAILED: Final = 4

@@ -3,6 +3,7 @@
 All times are ns since 1970: those of the host's monotonic clock plus `unix_ns`. docs/recordings.md describes it for others.
 """
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -162,3 +163,29 @@ def _orientation(text: str) -> Orientation:
 def _whole(values: Mapping[str, str], key: str) -> int:
     text = values.get(key, "")
     return int(text) if text.isascii() and text.isdecimal() and len(text) < 20 else 0
+
+
+class CaptureRuns:
+    """Collects what one message of CAPTURE tells: [first sequence, [ns, ns, ...]] for each run of frames without a gap."""
+
+    def __init__(self) -> None:
+        self._runs: list[tuple[int, list[int]]] = []
+
+    def note(self, sequence: int, capture_ns: int) -> None:
+        """Take note of a frame.
+
+        Args:
+            sequence: its number.
+            capture_ns: from its exposure until it was grabbed, ns.
+        """
+        first, values = self._runs[-1] if self._runs else (sequence, [])
+        if not self._runs or first + len(values) != sequence:
+            values = []
+            self._runs.append((sequence, values))
+        values.append(capture_ns)
+
+    def take(self) -> bytes:
+        """Return the message of what was noted, and begin anew; empty: nothing was."""
+        text = json.dumps(self._runs, separators=(",", ":")).encode() if self._runs else b""
+        self._runs = []
+        return text

@@ -13,11 +13,22 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from common.recording.file_bytes import StoredData, pieces
-from common.recording.mcap_parsing import (
+from common.recording.mcap_records import (
+    CHANNELS,
+    MAGIC,
+    MOST_CHUNK_BYTES,
     RECORD_HEAD,
     WORD,
+    Channel,
+    Chunk,
     ChunkHead,
+    Damage,
+    Inflate,
+    InflateError,
+    Message,
+    Record,
     SpoiledError,
+    StoredMessage,
     crc32,
     read_attachment,
     read_channel,
@@ -26,19 +37,6 @@ from common.recording.mcap_parsing import (
     read_schema,
     require_index,
     unpack,
-)
-from common.recording.mcap_records import (
-    CHANNELS,
-    MAGIC,
-    MOST_CHUNK_BYTES,
-    Channel,
-    Chunk,
-    Damage,
-    Inflate,
-    InflateError,
-    Message,
-    Record,
-    StoredMessage,
 )
 
 _MESSAGE: Final = struct.Struct("<HIQQ")

@@ -8,7 +8,7 @@ from typing import Final
 from common.errors import SettingsError
 from common.program.settings import DEFAULT, Resolved
 from phone_host.api.scanner import Scanner
-from phone_host.camera.http_uri import without_password
+from phone_host.camera.uris import without_password
 from phone_host.declared_settings import NEAR_M, PhoneHostSettings
 from phone_host.jobs.options import RunCameraOptions
 from phone_host.jobs.run import open_run

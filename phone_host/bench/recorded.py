@@ -13,8 +13,8 @@ from typing import Final
 from common.errors import DataError, SettingsError
 from common.ledger import PairLedger
 from common.protocol.message import BoardCounts, Pacing
-from common.recording.numbering import pairs_of_two
 from common.recording.recorded import Recorded
+from common.recording.stamps import pairs_of_two
 from common.strict_json import strict_json
 from common.words import counted
 from phone_host.accounts.link_account import LinkAccount, SessionAccount

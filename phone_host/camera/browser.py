@@ -20,12 +20,12 @@ from common.program.logs import event
 from common.protocol.message import CameraDescription, Locks, Pacing
 from common.stamp import Stamp
 from phone_host.camera.browser_border import Believed, BrowserBorder
-from phone_host.camera.browser_epoch import Epoch
+from phone_host.camera.browser_clock import Epoch
 from phone_host.camera.browser_feed import BrowserFeed, Seat
 from phone_host.camera.browser_locks import locks_of
-from phone_host.camera.browser_uri import BrowserSettings
 from phone_host.camera.browser_wire import Hello
 from phone_host.camera.far import LIFE, MEASURE_FRAMES, MEASURE_NS, SECOND_NS, FarCamera
+from phone_host.camera.uris import BrowserSettings
 
 _LOG = logging.getLogger(__name__)
 

@@ -14,7 +14,6 @@ from common.program.logs import event
 from common.protocol.message import Locks
 from phone_host.camera.browser_clock import BrowserClock
 from phone_host.camera.browser_locks import groups_of
-from phone_host.camera.browser_uri import BrowserSettings
 from phone_host.camera.browser_wire import (
     IDLE_TEXT,
     Bye,
@@ -34,6 +33,7 @@ from phone_host.camera.browser_wire import (
     want_text,
     welcome_text,
 )
+from phone_host.camera.uris import BrowserSettings
 
 _LOG = logging.getLogger(__name__)
 

@@ -18,7 +18,7 @@ from common.imagesize.jpeg import jpeg_head
 from common.orientation import UPRIGHT
 from common.plain_text import printable
 from common.protocol.wire_fields import MAX_SIZE_PX
-from phone_host.camera.browser_uri import BrowserSettings
+from phone_host.camera.uris import BrowserSettings
 
 VERSION: Final = 1
 MOST_TEXT: Final = 16_384

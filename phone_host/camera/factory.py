@@ -4,21 +4,26 @@ from typing import Final
 
 from common.camera import factory as common_factory
 from common.camera.base import Camera
-from common.camera.turned import turned
+from common.camera.factory import turned
 from common.errors import SettingsError
 from common.frame import ImageSizeError
 from common.imagesize.head import MOST_PIXELS, require_pixels
 from common.orientation import Orientation
 from common.program.extensions import named
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.browser_uri import browser_settings, is_browser
-from phone_host.camera.examples import EXAMPLE
-from phone_host.camera.http_uri import http_settings, is_http, without_orientation
+from phone_host.camera.uris import (
+    EXAMPLE,
+    browser_settings,
+    http_settings,
+    is_browser,
+    is_http,
+    without_orientation,
+)
 
 _HTTP: Final = "phone_host.camera.mjpeg_http:HttpCamera"
 """Named, not imported: TLS and its dependencies are loaded only if a server is asked for."""
 
-_REPLAYED: Final = "common.camera.replay_uri:require_replayed"
+_REPLAYED: Final = "common.camera.recorded:require_replayed"
 _BROWSER: Final = "phone_host.camera.browser:BrowserCamera"
 
 

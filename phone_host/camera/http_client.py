@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Final
 
 from common.errors import UnavailableError
-from phone_host.camera.http_uri import HttpSettings
+from phone_host.camera.uris import HttpSettings
 
 _READ_BYTES: Final = 65_536
 """More than a phone's JPEG at 720p, so one read takes everything that has come."""

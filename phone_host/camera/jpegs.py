@@ -1,4 +1,4 @@
-"""Finds JPEG images in a byte stream by their own structure. Sans-I/O: bytes in, images out, `now_ns` passed in.
+"""Finds JPEG images in a byte stream by their own structure, and measures how irregularly they come. Sans-I/O: bytes in, images out, `now_ns` passed in.
 
 What a server writes between images (multipart boundaries, part headers) is ignored: servers omit dashes, lengths and
 line ends, announce one boundary and write another, and write the next boundary together with the image before it. A
@@ -15,6 +15,7 @@ every byte is examined once. At most MAX_IMAGE_BYTES are kept.
 """
 
 import re
+from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, assert_never
@@ -231,3 +232,42 @@ class JpegStream:
         self._passed_bytes += count
         self._old_bytes = max(0, self._old_bytes - count)
         del self._data[:count]
+
+
+_ARRIVALS: Final = 61
+"""Two seconds at 30 frames a second, short enough for a camera's clock to be steady."""
+
+_LEAST_ARRIVALS: Final = 16
+
+
+class Arrivals:
+    """The recent arrivals."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[int, int]] = deque(maxlen=_ARRIVALS)
+
+    def add(self, sequence: int, arrived_ns: int) -> None:
+        """Take note of an image's arrival and its number in the stream."""
+        self._seen.append((sequence, arrived_ns))
+
+    def restart(self) -> None:
+        """Take note that the stream begins anew."""
+        self._seen.clear()
+
+    @property
+    def jitter_ns(self) -> int | None:
+        """The images' 95th percentile of lateness relative to the fastest one, ns; None before 16 images.
+
+        Lateness is measured against the least-squares line.
+        """
+        if len(self._seen) < _LEAST_ARRIVALS:
+            return None
+        count = len(self._seen)
+        first_sequence, first_ns = self._seen[0]
+        points = [(sequence - first_sequence, arrived_ns - first_ns) for sequence, arrived_ns in self._seen]
+        middle_x, middle_y = (sum(values) / count for values in zip(*points, strict=True))
+        over = sum((x - middle_x) * (y - middle_y) for x, y in points)
+        under = sum((x - middle_x) ** 2 for x, _ in points)
+        slope = over / under if under else 0.0
+        late = sorted(y - slope * x for x, y in points)
+        return round(late[count * 95 // 100] - late[0])

@@ -21,11 +21,10 @@ from common.imagesize.head import size_text
 from common.program.logs import event
 from common.protocol.message import CameraDescription, Pacing
 from common.stamp import Stamp
-from phone_host.camera.arrivals import Arrivals
 from phone_host.camera.far import LIFE, MEASURE_FRAMES, MEASURE_NS, SECOND_NS, FarCamera
 from phone_host.camera.http_client import Connection
-from phone_host.camera.http_uri import HttpSettings
-from phone_host.camera.jpegs import JpegStream, Whole
+from phone_host.camera.jpegs import Arrivals, JpegStream, Whole
+from phone_host.camera.uris import HttpSettings
 
 _LOG = logging.getLogger(__name__)
 

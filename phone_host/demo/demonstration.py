@@ -1,7 +1,7 @@
 """The demo: a rendered moving scene, a real board-agent process and the host on this machine, compared with the scene's truth."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -13,14 +13,31 @@ from common.camera.factory import open_camera
 from common.ledger import PairLedger
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
-from phone_host.model import CloudImage, Processed, Result, Rig
+from common.words import counted
+from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.model import CloudImage, Processed, Result, Rig, Side
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import disparity_picture, write_png
+from phone_host.report.page_links import FileLink, NextCommand
+from phone_host.report.report_page import Figure, Headline, PageData, delay_series, page
+from phone_host.report.run_page import (
+    camera_table,
+    clock_figure,
+    depth_card,
+    end_to_end_figure,
+    files,
+    notes,
+    pictures,
+    rate_figure,
+    steps,
+    unused_table,
+)
 from phone_host.run.host import Host
 from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import Film
-from phone_host.scene.scene import RectifiedView, Scene, rig_poses, truth
+from phone_host.scene.scene import truth
+from phone_host.scene.scene_model import RectifiedView, Scene, rig_poses
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier
@@ -59,7 +76,7 @@ class CheckedPair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DepthErrors:
-    """Errors of the measured depth against the truth, over all checked pairs and all pixels that both cameras see.
+    """Errors of the measured depth against the truth, over all checked pairs and all pixels that both cameras see; NaN where nothing was measured.
 
     Attributes:
         pairs: pairs compared.
@@ -77,14 +94,14 @@ class DepthErrors:
 
     pairs: int
     pixels: int
-    density: float
-    disparity_px: float
-    outliers: float
-    depth_mm: float
-    depth_p95_mm: float
-    depth_percent: float
-    at_1_m_mm: float
-    at_2_m_mm: float
+    density: float = math.nan
+    disparity_px: float = math.nan
+    outliers: float = math.nan
+    depth_mm: float = math.nan
+    depth_p95_mm: float = math.nan
+    depth_percent: float = math.nan
+    at_1_m_mm: float = math.nan
+    at_2_m_mm: float = math.nan
     wrong_pairs: int
 
 
@@ -202,28 +219,15 @@ def truth_json(errors: DepthErrors) -> dict[str, float | int | None]:
 def _errors(
     *, pairs: int, wrong: int, disparity_errors: list[np.ndarray], depths: list[np.ndarray], measured: list[np.ndarray]
 ) -> DepthErrors:
-    nan = float("nan")
     if not pairs:
-        return DepthErrors(
-            pairs=0,
-            pixels=0,
-            density=nan,
-            disparity_px=nan,
-            outliers=nan,
-            depth_mm=nan,
-            depth_p95_mm=nan,
-            depth_percent=nan,
-            at_1_m_mm=nan,
-            at_2_m_mm=nan,
-            wrong_pairs=wrong,
-        )
+        return DepthErrors(pairs=0, pixels=0, wrong_pairs=wrong)
     off_px, depth_m, measured_m = (np.concatenate(part) for part in (disparity_errors, depths, measured))
     found = np.isfinite(measured_m)
     off_px, depth_m, off_mm = np.abs(off_px[found]), depth_m[found], np.abs(measured_m[found] - depth_m[found]) * 1000
 
     def near(low_m: float, high_m: float) -> float:
         here = (depth_m >= low_m) & (depth_m <= high_m)
-        return float(np.median(off_mm[here])) if here.any() else nan
+        return float(np.median(off_mm[here])) if here.any() else math.nan
 
     return DepthErrors(
         pairs=pairs,
@@ -237,4 +241,87 @@ def _errors(
         at_1_m_mm=near(0.9, 1.1),
         at_2_m_mm=near(1.8, 2.2),
         wrong_pairs=wrong,
+    )
+
+
+_GOOD_PERCENT = 0.6
+"""Depth error at 2 m that the stereo core's figures allow; the demo's scene lies between 0.7 and 2.5 m."""
+
+
+def demo_page(
+    run: RunSnapshot,
+    errors: DepthErrors,
+    last: CheckedPair | None,
+    ledgers: Sequence[PairLedger],
+    commands: tuple[NextCommand, ...] = (),
+) -> str:
+    """Make the page.
+
+    Args:
+        run: the run.
+        errors: errors of the depth against the truth.
+        last: the pair to show; None if there was none.
+        ledgers: of all pairs, in order.
+        commands: what to type next.
+
+    Returns:
+        One self-contained HTML document.
+    """
+    verdict, sentence = _verdict(errors)
+    return page(
+        PageData(
+            title="tandemscan demo",
+            subtitle=f"two rendered cameras, two processes, one ipc link between them; {now.wall_time()}",
+            verdict=verdict,
+            sentence=sentence,
+            figures=_figures(run, errors),
+            depth=depth_card(last.processed if last else None, Side.LEFT, "A pair, and its depth"),
+            pictures=pictures(last.processed if last else None),
+            delays=delay_series(ledgers, after_gap_ns=run.after_gap_ns, statistics=run.delays),
+            tables=(unused_table(run), camera_table(run.camera)),
+            commands=commands,
+            notes=(
+                *steps(run),
+                "The truth is the rendered scene itself: exact depth at every pixel that both cameras see.",
+                "Board and host share one clock here, so the clock's true offset is 0; what is plotted is what the echoes could prove.",
+                *notes(run),
+            ),
+            files=(FileLink("cloud.ply", "this pair's point cloud, metres: X right, Y down, Z forward"), *files(())),
+        )
+    )
+
+
+def _verdict(errors: DepthErrors) -> tuple[Headline, str]:
+    if not errors.pairs:
+        return Headline.BAD, "No pair was compared with the truth: the run was too short or the programs did not meet."
+    if errors.wrong_pairs:
+        return Headline.BAD, f"{errors.wrong_pairs} of {counted(errors.pairs, 'pair')} show two different moments."
+    text = f"Every checked pair shows one moment, and its depth is right within {errors.depth_mm:.1f} mm ({errors.depth_percent:.2f} %) at the median."
+    return (Headline.GOOD if errors.depth_percent <= _GOOD_PERCENT else Headline.WARNING), text
+
+
+def _figures(run: RunSnapshot, errors: DepthErrors) -> tuple[Figure, ...]:
+    skew = run.delays.spread("time_skew")
+    return (
+        rate_figure(run),
+        Figure(
+            label="depth error",
+            value=f"{errors.depth_mm:.1f}",
+            unit="mm",
+            note=f"median; {errors.at_1_m_mm:.1f} mm at 1 m, {errors.at_2_m_mm:.1f} mm at 2 m",
+        ),
+        Figure(
+            label="pixels with depth",
+            value=f"{errors.density * 100:.0f}",
+            unit="%",
+            note="of those that both cameras see",
+        ),
+        end_to_end_figure(run),
+        Figure(
+            label="time skew",
+            value=f"{skew.p50_ns / 1e3:.0f}",
+            unit="\u00b5s",
+            note=f"median; 99 % below {skew.p99_ns / 1e3:.0f} \u00b5s",
+        ),
+        clock_figure(run),
     )

@@ -35,9 +35,8 @@ from common.link.factory import parse_link
 from common.places import Kind, nearest
 from common.stamp import HOST_CLOCK
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera
-from phone_host.camera.http_uri import is_http
+from phone_host.camera.uris import is_browser, is_http
 from phone_host.doctor.android_checks import Phone, check_camera, check_phone, check_usb
 from phone_host.doctor.android_checks import check_bluetooth as check_android_bluetooth
 from phone_host.doctor.host_checks import (

@@ -18,9 +18,8 @@ from common.keys import KeyFolder
 from common.link.factory import open_link, parse_link
 from common.stamp import HOST_CLOCK
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import camera_orientation, open_camera
-from phone_host.camera.http_uri import is_http
+from phone_host.camera.uris import is_browser, is_http
 from phone_host.doctor.camera_check.words import holds_for, stored_finding
 from phone_host.doctor.capture import source_of
 from phone_host.doctor.host_checks import Answer, BoardReadings

@@ -7,7 +7,7 @@ from common.camera.options import TURNED
 from common.orientation import Flip, Orientation
 from common.program.quantities import milliseconds, seconds
 from common.program.request import option
-from phone_host.camera.examples import EXAMPLE
+from phone_host.camera.uris import EXAMPLE
 from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
 
 PAIRED: Final = (

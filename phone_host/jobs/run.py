@@ -16,9 +16,8 @@ from common.program.settings import Resolved, with_origins
 from common.recording.recording_file import require_new
 from common.stamp import HOST_CLOCK
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
-from phone_host.camera.http_uri import without_password
+from phone_host.camera.uris import EXAMPLE, without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.discovery.discovery import remember
@@ -28,9 +27,8 @@ from phone_host.jobs.run_request import RunRequest, budget_wanted, with_own_rig
 from phone_host.jobs.stereo_core import build_core, overlay_of
 from phone_host.model import Rig, Side, TimeOffset
 from phone_host.output.json_text import json_text
-from phone_host.recording.begin import begin_recording
-from phone_host.recording.opened import open_playback
-from phone_host.recording.playback import Playback
+from phone_host.recording.playback import Playback, open_playback
+from phone_host.recording.recorder import begin_recording
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.report.run_json import build
 from phone_host.report.run_page import run_page

@@ -1,24 +1,110 @@
-"""Joins what a board recorded alone with what its host recorded meanwhile, into one recording that plays as any other."""
+"""Writes recordings anew: what is whole in a broken one, a part of one, or two as one.
+
+Joins what a board recorded alone with what its host recorded meanwhile, into one recording that plays as any other.
+"""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, SettingsError
-from common.recording.capture_runs import CaptureRuns
 from common.recording.inflate import inflate
-from common.recording.layout import ABOUT, CAPTURE, CLOCK, camera_name, image_topic
-from common.recording.mcap_records import CHANNELS, Message
+from common.recording.layout import ABOUT, CAPTURE, CLOCK, CaptureRuns, camera_name, image_topic, topics
+from common.recording.mcap_records import CHANNELS, Attachment, Channel, Damage, Message, Metadata
+from common.recording.mcap_writer import MOST_TOPICS, Topic
 from common.recording.opened import open_recorded, stored_data
-from common.recording.recorded import Recorded, Shown, period_ns
+from common.recording.recorded import Recorded, Shown, image_kind, period_ns
 from common.recording.recording_file import RecordingFile, written
-from common.recording.ros_messages import RecordedImage, image_parts, image_type
+from common.recording.ros_messages import SCHEMAS, RecordedImage, image_parts, image_type
 from common.recording.salvage import Salvage
 from phone_host.model import Side
 from phone_host.recording.clock_messages import ToldClock, clock_text, narrowest, told_clocks, worst_ns
 from phone_host.sync.clock import ClockEstimate
+
+_JSON: Final = "json"
+
+
+class CopyAccount:
+    """What became of the messages of a recording that was copied.
+
+    Attributes:
+        messages: how many were copied.
+        images: how many of them are images.
+        left_out: topics whose messages this program cannot write, with their number.
+        damages: where something was missing.
+    """
+
+    def __init__(self) -> None:
+        self.messages = self.images = 0
+        self.left_out: dict[str, int] = {}
+        self.damages: list[Damage] = []
+
+
+def copy_recording(source: Path, out: Path, wanted: Callable[[Message], bool] = lambda _: True) -> CopyAccount:
+    """Write what is whole in a recording into another file.
+
+    Args:
+        source: the recording.
+        out: the new file; it must not exist.
+        wanted: whether a message is copied.
+
+    Raises:
+        UnavailableError: the file cannot be made, or the disk is full.
+        DataError: the source cannot be read, or is no MCAP file.
+    """
+    data = stored_data(source)
+    channels = {topic.name: topic for topic in topics()}
+    account = CopyAccount()
+    for record in Salvage(data, inflate).records():
+        if isinstance(record, Message) and record.channel is not None and record.channel.topic not in channels:
+            topic = _topic(record.channel)
+            if topic is not None:
+                channels[topic.name] = topic
+                if len(channels) > MOST_TOPICS:
+                    raise DataError(
+                        f"{source} has more than {MOST_TOPICS} topics, which no MCAP file can", "give another recording"
+                    )
+    with written(out, tuple(channels.values())) as file:
+        for record in Salvage(data, inflate).records():
+            match record:
+                case Message() if wanted(record):
+                    _copy(file, record, channels, account)
+                case Metadata(name, values) if name != CHANNELS:
+                    file.tell(name, dict(values))
+                case Attachment(name, content):
+                    file.attach(name, "application/octet-stream", bytes(content), 0)
+                case Damage():
+                    account.damages.append(record)
+                case _:
+                    pass
+    return account
+
+
+def _copy(file: RecordingFile, message: Message, channels: dict[str, Topic], account: CopyAccount) -> None:
+    topic = message.channel.topic if message.channel is not None else "unknown"
+    if message.channel is None or not _fits(message.channel, channels.get(topic)):
+        account.left_out[topic] = account.left_out.get(topic, 0) + 1
+        return
+    file.add(topic, message.data, sequence=message.sequence, log_ns=message.log_ns, publish_ns=message.publish_ns)
+    account.messages += 1
+    account.images += bool(image_kind(message.channel))
+
+
+def _fits(channel: Channel, topic: Topic | None) -> bool:
+    """Return whether a channel's messages are those of a topic that is written: its name may be used by other programs."""
+    return topic is not None and (topic.kind, topic.encoding) == (channel.kind, channel.encoding)
+
+
+def _topic(channel: Channel) -> Topic | None:
+    """Return what this program writes for a channel; None: its message is none that it knows."""
+    if channel.encoding == _JSON and not channel.kind:
+        return Topic(channel.topic, _JSON)
+    if channel.kind in SCHEMAS and channel.encoding == "cdr":
+        return Topic(channel.topic, "cdr", channel.kind, "ros2msg", SCHEMAS[channel.kind].encode())
+    return None
+
 
 _LINK: Final = "joined"
 _PART: Final = re.compile(r"-\d{6,9}\.mcap$")
@@ -196,9 +282,9 @@ def _ascending(shown: Sequence[Shown]) -> list[Shown]:
     return sorted(shown, key=lambda one: one.image.stamp_ns)
 
 
-def _later(shown: Shown, by_ns: int, frame_id: str = "") -> Shown:
+def _later(shown: Shown, by_ns: int) -> Shown:
     image = shown.image
-    moved = replace(image, stamp_ns=image.stamp_ns + by_ns, frame_id=frame_id or image.frame_id)
+    moved = replace(image, stamp_ns=image.stamp_ns + by_ns)
     return Shown(moved, shown.sequence, shown.log_ns + by_ns, shown.publish_ns + by_ns, shown.grabbed_ns + by_ns)
 
 

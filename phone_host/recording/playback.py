@@ -8,9 +8,11 @@ import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, Protocol
+from urllib.parse import parse_qsl
 
 from common import now
 from common.camera.base import CameraHealth
+from common.errors import SettingsError
 from common.frame import Frame, SpoiledImageError, find_fault
 from common.ledger import BoardMarks, PairLedger, ledger_of
 from common.protocol.message import (
@@ -331,3 +333,25 @@ class PlayedCamera:
     def stop(self) -> None:
         """Let none come any more."""
         self._player.stop()
+
+
+_PACES = {pacing.name.lower(): pacing for pacing in Pacing}
+
+
+def open_playback(text: str, board_side: str | None = None) -> Playback:
+    """Open a recording that is to be played.
+
+    Args:
+        text: FILE.mcap, FILE.mcap?pace=clock or FILE.mcap?pace=demand.
+        board_side: left or right: which images came over the link; None: as the recording says.
+
+    Raises:
+        SettingsError: the option is none.
+        DataError: it cannot be read, or is no recording of two cameras.
+    """
+    path, mark, query = text.partition("?")
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    pace = options.pop("pace", "demand")
+    if pace not in _PACES or options or (mark and not query):
+        raise SettingsError(f"--replay {text!r} is not understood", "give FILE.mcap, or 'FILE.mcap?pace=clock'")
+    return Playback(Path(path), _PACES[pace], None if board_side is None else Side(board_side))

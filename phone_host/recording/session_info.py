@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Final
 
 from common.recording.layout import side_of
-from common.recording.numbering import nearest
 from common.recording.recorded import Recorded, Shown, period_ns
+from common.recording.stamps import nearest
 
 _GAP: Final = 1.5
 """A time between two images that is this many periods long has room for one that is missing."""

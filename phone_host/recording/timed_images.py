@@ -13,7 +13,7 @@ from common.camera.replay import find_images
 from common.errors import DataError
 from common.files import read_whole
 from common.words import counted
-from phone_host.recording.given_times import EPOCH_NS, Unit, at_rate, dated_unit, numbers_in, times_ns, usual_step
+from phone_host.recording.import_rules import Unit, at_rate, dated_unit, numbers_in, times_ns, usual_step
 
 _MOST_TIMES_BYTES: Final = 64 << 20
 _SECONDS: Final = re.compile(r"[0-9]{1,12}\.[0-9]{1,9}")
@@ -68,7 +68,7 @@ def _at_rate(folders: tuple[Path, Path], fps: float) -> tuple[list[TimedImage], 
     places = _places([_numbers_in_names(each) for each in paths]) or [list(range(len(each))) for each in paths]
     sides = []
     for each, of in zip(paths, places, strict=True):
-        stamps = at_rate(of, fps, EPOCH_NS)
+        stamps = at_rate(of, fps)
         sides.append(_sorted([TimedImage(path, at) for path, at in zip(each, stamps, strict=True)]))
     return sides[0], sides[1]
 

@@ -9,9 +9,8 @@ import numpy as np
 from common.errors import DataError
 from common.orientation import UPRIGHT
 from common.words import counted
-from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import SHARE_GOOD
+from phone_host.calibration.solve.bundle_problem import Bend
+from phone_host.calibration.solve.verdict import SHARE_GOOD, Calibration
 from phone_host.calibration.target.board_views import BoardViews, turn_text
 from phone_host.calibration.target.pairs import Rejected
 from phone_host.model import Verdict

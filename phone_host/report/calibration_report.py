@@ -10,8 +10,7 @@ from common.diagnostic import Diagnostic
 from common.errors import DataError
 from common.imagesize.head import size_text
 from phone_host.calibration.guide.snapshot import GuideSnapshot
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment
+from phone_host.calibration.solve.verdict import Assessment, Calibration
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.marked import Charuco

@@ -13,7 +13,7 @@ from common.imagesize.head import size_text
 from common.orientation import UPRIGHT
 from common.versions import REPORT_FORMAT
 from phone_host.calibration.failure_modes.mistakes import Turned
-from phone_host.calibration.solve.result import Calibration, Used
+from phone_host.calibration.solve.verdict import Calibration, Used
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.model import CameraModel, Rig
 from phone_host.report.calibration_report import CalibrationReport, Exported, ImportReport, Judged

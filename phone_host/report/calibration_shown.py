@@ -5,12 +5,10 @@ from pathlib import Path
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from phone_host.calibration.solve.series_snapshot import Taken, series_rig, series_views
-from phone_host.calibration.solve.view_turns import view_turns
-from phone_host.calibration.target.board_views import Mounted
+from phone_host.calibration.solve.series_snapshot import Taken, series_rig, series_views, view_turns
+from phone_host.calibration.target.board_views import Mounted, fullest, rectified_view
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import Rejected
-from phone_host.calibration.target.rectified_view import fullest, rectified_view
 from phone_host.model import Rig, Verdict
 from phone_host.model.calibration_series import CalibrationSeries
 from phone_host.output.atomic import write_text

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from common.diagnostic import Diagnostic
-from phone_host.calibration.solve.board_plane import BoardPlane, find_board_plane
+from phone_host.calibration.solve.board_pose import BoardPlane, find_board_plane
 from phone_host.calibration.target.corners import Board
 from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.headline import depth_error_m

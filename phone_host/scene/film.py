@@ -13,7 +13,8 @@ from common.errors import UnavailableError
 from common.places import make_folder
 from phone_host.model import CameraModel, Image, Rig
 from phone_host.output.atomic import write_bytes
-from phone_host.scene.scene import Look, Renderer, Scene, rig_poses
+from phone_host.scene.scene_model import Look, Scene, rig_poses
+from phone_host.scene.scene_render import Renderer
 
 JPEG_QUALITY: Final = 92
 """Below 90, compression artefacts degrade the matcher's result (study of the stereo core, 3.5b)."""

@@ -20,8 +20,6 @@ from phone_host.calibration.target.marked import MarkFamily
 from phone_host.calibration.target.sheet import Paper
 from phone_host.calibration.target.sheet_layout import Chessboard, MarkedBoard, marked_sheet
 from phone_host.model import CameraModel, Image, Rig, Side
-from phone_host.scene.objects import OBJECTS
-from phone_host.scene.printed import printed_sheet
 from phone_host.scene.scene_model import (
     Body,
     Box,
@@ -33,10 +31,11 @@ from phone_host.scene.scene_model import (
     Scene,
     Texture,
     Vector,
+    printed_sheet,
     rotation,
 )
 from phone_host.scene.scene_render import render
-from phone_host.scene.solid import Solid
+from phone_host.scene.solid import OBJECTS, Solid
 
 OBJECT_NAMES: Final = tuple(OBJECTS)
 

@@ -19,9 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.scene.cast import box_interval, column, faces_and_normals, to_body
-from phone_host.scene.printed import printed_albedo
 from phone_host.scene.round_shapes import dot
-from phone_host.scene.scene_model import Body, Box, Floats, Frustum, Light, Plane, Print, Sphere, Texture, Torus
+from phone_host.scene.scene_model import (
+    Body,
+    Box,
+    Floats,
+    Frustum,
+    Light,
+    Plane,
+    Print,
+    Sphere,
+    Texture,
+    Torus,
+    printed_albedo,
+)
 
 _TILE = 512
 _WAVE_TEXELS = 16

@@ -10,7 +10,7 @@ from typing import Final, NoReturn, TypeVar
 from common.errors import SettingsError
 from common.program.commandline import ExamplesFirstParser
 from common.program.request import add_options, read_request
-from phone_host.camera.browser_uri import is_browser
+from phone_host.camera.uris import is_browser
 from phone_host.jobs.run_request import RunRequest
 from phone_host.jobs.scan_request import ModelOptions, model_wanted
 from phone_host.scan.scan_wanted import ScanWanted

@@ -14,9 +14,8 @@ from common.program.invocation import command_line
 from common.program.settings import log_level
 from common.stamp import HOST_CLOCK
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.browser_uri import is_browser
 from phone_host.camera.factory import open_camera, require_replayed
-from phone_host.camera.http_uri import without_password
+from phone_host.camera.uris import is_browser, without_password
 from phone_host.doctor.camera_check.check import Progress
 from phone_host.doctor.capture import check_capture
 from phone_host.doctor.host_doctor import Question

@@ -5,7 +5,7 @@ from common.errors import TandemError
 from common.keys import KeyFolder
 from common.link.factory import needs_keys, parse_link
 from common.peers import Peer, peer_at
-from phone_host.camera.browser_uri import SCHEME
+from phone_host.camera.uris import SCHEME
 from phone_host.discovery.discovery import list_boards
 from phone_host.discovery.found import Found
 from phone_host.web.source import Choice

@@ -15,8 +15,7 @@ from common.program.invocation import command_line
 from common.program.settings import Resolved
 from common.program.terminal import say
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.browser_uri import is_browser
-from phone_host.camera.http_uri import without_password
+from phone_host.camera.uris import is_browser, without_password
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.jobs.run_request import RunRequest
 from phone_host.output.axes import Axes

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.geometry.rig_pixels import pixel_derivatives, standard_errors
+from phone_host.geometry.lens import pixel_derivatives, standard_errors
 from phone_host.model import Epipolar, Rectification, Rig
 from phone_host.stereo.between_pixels import Floats
 

@@ -8,8 +8,7 @@ from typing import Final
 
 from common import now
 from common.errors import ProtocolError
-from common.link.base import Broken, Link, Packet
-from common.link.several import SeveralLinks
+from common.link.base import Broken, Link, Packet, SeveralLinks
 from common.link.waiter import Waiter
 from common.protocol.message import BoardHello, Locks, LockState, Ping
 from common.protocol.session import Outgoing, connection_name

@@ -25,8 +25,8 @@ from phone_host.calibration.time_offset.misfit_plot import misfit_svg
 from phone_host.calibration.time_offset.screen import PatternReader, counted, measure_screen, pattern_page
 from phone_host.calibration.time_offset.shared_motion import measure_shared_motion
 from phone_host.calibration.time_offset.shots import Measured, Times, require_shots, to_seconds
-from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
+from phone_host.camera.uris import EXAMPLE
 from phone_host.discovery.opened import open_named
 from phone_host.jobs.options import OneLinkOptions
 from phone_host.jobs.output_folders import (

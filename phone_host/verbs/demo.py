@@ -19,8 +19,7 @@ from common.program.settings import with_origins
 from common.program.signals import StopSignals
 from common.program.terminal import columns, headed, rows, say
 from common.words import counted
-from phone_host.demo.demo_page import demo_page
-from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, truth_json
+from phone_host.demo.demonstration import FPS, DemoRun, DepthErrors, demo_page, truth_json
 from phone_host.model import Rig
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text
@@ -33,7 +32,8 @@ from phone_host.run.file_sink import NAMES
 from phone_host.run.progress_bar import announce, busy_bar, progress_bar
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
-from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene, unlike_rig
+from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, demo_scene, unlike_rig
+from phone_host.scene.scene_model import Scene
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.subprocesses.board_process import socket_folder
 

@@ -17,8 +17,7 @@ from common.program.invocation import command_line
 from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
-from phone_host.demo.scan_demonstration import ScanDemo, render_pictures, with_truth
-from phone_host.demo.scan_truth import ModelErrors
+from phone_host.demo.scan_demonstration import ModelErrors, ScanDemo, render_pictures, with_truth
 from phone_host.output.atomic import write_bytes
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.json_text import json_text

@@ -9,7 +9,7 @@ from common.errors import SettingsError
 from common.program.quantities import seconds
 from common.program.request import Request, option
 from common.program.terminal import fitted
-from phone_host.camera.examples import EXAMPLE
+from phone_host.camera.uris import EXAMPLE
 from phone_host.declared_settings import PhoneHostSettings
 from phone_host.doctor.host_doctor import Question, examine
 from phone_host.output.data_folder import data_folder

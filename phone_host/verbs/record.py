@@ -23,8 +23,8 @@ from common.program.terminal import fitted
 from common.recording.recording_file import require_new
 from common.stamp import HOST_CLOCK
 from common.versions import REPORT_FORMAT
-from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
+from phone_host.camera.uris import EXAMPLE
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.discovery.opened import open_named
 from phone_host.jobs.options import CameraOptions
@@ -32,9 +32,8 @@ from phone_host.jobs.output_folders import require_alone
 from phone_host.model import Rig, Side
 from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig
-from phone_host.recording.begin import begin_recording
-from phone_host.recording.filming import take_alone, take_frames
-from phone_host.recording.unpaired import UnpairedFrames
+from phone_host.recording.footage import take_alone, take_frames
+from phone_host.recording.recorder import UnpairedFrames, begin_recording
 from phone_host.report.run_json import recording_values
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings

@@ -25,11 +25,9 @@ from phone_host.model import Side
 from phone_host.output.atomic import write_text
 from phone_host.output.json_text import json_text
 from phone_host.recording.bags import RecordingSource, as_recording
-from phone_host.recording.copied import CopyAccount, copy_recording
-from phone_host.recording.folders import export_folders, import_folders
-from phone_host.recording.given_times import Unit
-from phone_host.recording.joining import JoinAccount, join_recordings
-from phone_host.recording.other_topics import ImportOptions, import_topics
+from phone_host.recording.import_rules import Unit
+from phone_host.recording.imports import ImportOptions, export_folders, import_folders, import_topics
+from phone_host.recording.joining import CopyAccount, JoinAccount, copy_recording, join_recordings
 from phone_host.recording.session_info import SessionInfo, session_info
 from phone_host.recording.timed_images import TimeOptions
 from phone_host.run.progress_bar import busy_bar

@@ -25,7 +25,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.camera.browser_epoch import Epoch
+from phone_host.camera.browser_clock import Epoch
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.support.numbered_film import against_reads, reads_of, write_numbered

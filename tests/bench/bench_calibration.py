@@ -27,9 +27,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration, vertical_p95_px
 from phone_host.calibration.solve.verdict import judge as judged
-from phone_host.calibration.solve.verdict import vertical_p95_px
 from tests.bench.calibration_real import (
     RIGS,
     Corners,

@@ -24,7 +24,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.calibration.drift.rows import values_of
+from phone_host.calibration.drift.fit import values_of
 from phone_host.calibration.drift.watch import START_PX, WINDOW
 from phone_host.diagnostics.drift import drift_concerns
 from phone_host.model import AS_CALIBRATED, Departure, Drift

@@ -27,7 +27,7 @@ from rich.table import Table
 
 from phone_host.geometry.se3 import SE3
 from phone_host.geometry.triangulate import triangulate
-from phone_host.scene.scene import rotation
+from phone_host.scene.scene_model import rotation
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
 from tests.bench.measured_draws import draw_rows

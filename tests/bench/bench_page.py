@@ -25,7 +25,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from phone_host.scene.scene import WEBCAM_LOOK, Renderer, demo_scene, matched_rig, rig_poses
+from phone_host.scene.scene import WEBCAM_LOOK, demo_scene, matched_rig
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import Renderer
 from phone_host.subprocesses.board_process import board_process, socket_folder
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine

@@ -19,10 +19,9 @@ from rich.console import Console
 from rich.table import Table
 
 from phone_host.model import Crop, PlaneQuality, Processed, Seen
-from phone_host.scene.demo_scene import plane_scene, unlike_rig
+from phone_host.scene.scene import plane_scene, truth, unlike_rig
 from phone_host.scene.scene_model import Look, RectifiedView, Scene, rig_poses
 from phone_host.scene.scene_render import render
-from phone_host.scene.truth import truth
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match import MatchSettings

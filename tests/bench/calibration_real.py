@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.fitted_rig import square_sides_m
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.corners import Board, agree, find_corners
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Image

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.bundle_problem import Bend
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.corners import Board, agree, find_corners
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.lens import parameters_of, project

@@ -12,7 +12,8 @@ import numpy as np
 from phone_host.calibration.target.board_views import look_for_boards
 from phone_host.calibration.target.corners import Board
 from phone_host.model import Image
-from phone_host.scene.scene import Renderer, rig_poses
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.view_files import pair_files
 from tests.bench.drift_films import furnished_room, play_rig
 

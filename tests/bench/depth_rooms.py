@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from phone_host.model import StereoGeometry
 from phone_host.scene.cast import pixel_rays, to_body
-from phone_host.scene.scene import Body, Box, Plane, RectifiedView, Scene, Sphere, rectified_cameras, rotation, truth
-from phone_host.scene.scene_model import Rotation, Vector
+from phone_host.scene.scene import rectified_cameras, truth
+from phone_host.scene.scene_model import Body, Box, Plane, RectifiedView, Rotation, Scene, Sphere, Vector, rotation
 from tests.bench import room_painter
 from tests.bench.depth_scenes import Image, Values
 from tests.bench.room_painter import Paint, Painted, Pattern, paint_view

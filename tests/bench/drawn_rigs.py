@@ -6,10 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import FreeParameters, adjust
-from phone_host.calibration.solve.bundle_problem import BundleState, BundleView, moved
-from phone_host.geometry.rig_pixels import standard_errors
+from phone_host.calibration.solve.bundle import adjust, free_flags
+from phone_host.calibration.solve.bundle_problem import Bend, BundleState, moved
+from phone_host.geometry.lens import standard_errors
 from phone_host.geometry.se3 import rotations_of, vectors_of
 from phone_host.model import Rig
 from tests.support.boards import BOARD, exact_pairs, poses
@@ -25,8 +24,8 @@ def with_covariance(rig: Rig, seed: int) -> Rig:
     """Return a true rig with the covariance that a calibration with 15 boards has there."""
     board_poses = poses(_BOARDS, seed)
     pairs = exact_pairs(rig, board_poses, _CORNERS_PX, seed)
-    views = [BundleView(pair.left_px, pair.right_px) for pair in pairs]
-    free = FreeParameters(Bend.USUAL.free(), Bend.USUAL.free())
+    views = pairs
+    free = free_flags(Bend.USUAL.free(), Bend.USUAL.free())
     return replace(rig, covariance=adjust(views, BOARD.points_m(), _state(rig, board_poses), free).covariance)
 
 

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 
 from phone_host.model import CameraModel, Departure, Rig
-from phone_host.scene.scene import Body, Box, Look, Path, Plane, Renderer, Scene, Sphere, Texture, rig_poses, rotation
+from phone_host.scene.scene_model import Body, Box, Look, Path, Plane, Scene, Sphere, Texture, rig_poses, rotation
+from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.departure import corrected_rig
 from tests.bench.depth_scenes import Image
 

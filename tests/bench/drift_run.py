@@ -8,7 +8,8 @@ from typing import Final
 import cv2
 
 from phone_host.output.rig_yaml import write_rig
-from phone_host.scene.scene import Renderer, rig_poses
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.departure import corrected_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.bench.drift_films import furnished_room, play_rig, turned

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phone_host.calibration.drift.fit import fit_rows
-from phone_host.calibration.drift.rows import PARAMETERS, RowModel, Sighting, values_of
+from phone_host.calibration.drift.fit import PARAMETERS, RowModel, Sighting, fit_rows, values_of
 from phone_host.calibration.drift.see import Timed, sighting_of
 from phone_host.calibration.drift.watch import WINDOW, DriftWatch
 from phone_host.model import Change, Departure, Drift

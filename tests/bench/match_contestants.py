@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from phone_host.model import CameraModel, RectifiedPair, Rig
 from phone_host.output.ply import packed_points
-from phone_host.scene.scene import Look, demo_scene, matched_rig, rectified_cameras, render
+from phone_host.scene.scene import demo_scene, matched_rig, rectified_cameras
+from phone_host.scene.scene_model import Look
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import decode_pair
 from phone_host.stereo.match import MatchSettings, create_matcher

@@ -9,7 +9,7 @@ import numpy as np
 
 from phone_host.model import Rig
 from phone_host.scene.cast import cast, rays_through
-from phone_host.scene.scene import rotation
+from phone_host.scene.scene_model import rotation
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match import MatchSettings

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import cv2
 
-from phone_host.scene.scene import WEBCAM_LOOK, Renderer, demo_scene, matched_rig, rig_poses
+from phone_host.scene.scene import WEBCAM_LOOK, demo_scene, matched_rig
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import Renderer
 
 FRAMES = 30
 _JPEG_BYTES = 50_000

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from phone_host.model import CameraModel
 from phone_host.scene.cast import FACES, cast, pixel_rays, to_body
 from phone_host.scene.round_shapes import dot
-from phone_host.scene.scene import Body, Pose, Scene, Texture
-from phone_host.scene.scene_model import Floats, Vector
+from phone_host.scene.scene_model import Body, Floats, Pose, Scene, Texture, Vector
 from phone_host.scene.shade import albedo, surface_normals
 
 SAMPLES: Final = 3

@@ -9,9 +9,8 @@ import numpy as np
 
 from phone_host.model import CameraModel, Rig
 from phone_host.scene.object_scene import LOOKS, ObjectScene, Setting, mat_body, object_rig
-from phone_host.scene.objects import OBJECTS
 from phone_host.scene.scene_model import Body, Box, Frustum, Sphere, Texture, rotation
-from phone_host.scene.solid import Solid
+from phone_host.scene.solid import OBJECTS, Solid
 
 _PLASTER: Final = Texture(
     seed=71, light_bgr=(0.55, 0.56, 0.58), dark_bgr=(0.38, 0.38, 0.40), contrast=0.35, shortest_m=0.0015, longest_m=0.03

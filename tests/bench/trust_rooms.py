@@ -8,7 +8,8 @@ import cv2
 import numpy as np
 
 from phone_host.model import CameraModel, Rig
-from phone_host.scene.scene import Body, Box, Look, Plane, Renderer, Scene, Sphere, Texture, rig_poses, rotation
+from phone_host.scene.scene_model import Body, Box, Look, Plane, Scene, Sphere, Texture, rig_poses, rotation
+from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import StereoGeometry
-from phone_host.scene.scene import Body, Box, Plane, RectifiedView, Scene, Sphere, rectified_cameras, rotation, truth
+from phone_host.scene.scene import rectified_cameras, truth
+from phone_host.scene.scene_model import Body, Box, Plane, RectifiedView, Scene, Sphere, rotation
 from tests.bench.depth_rooms import GAIN, LOWER_PX, OFFSET, Sensor
 from tests.bench.depth_scenes import Image, Values
 from tests.bench.room_painter import Paint, Painted, paint_view

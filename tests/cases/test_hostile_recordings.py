@@ -20,7 +20,7 @@ from common.recording.salvage import MOST_TRIED, Salvage
 from common.strict_json import strict_json
 from phone_host.cli import main
 from phone_host.recording.clock_messages import told_clocks
-from phone_host.recording.opened import open_playback
+from phone_host.recording.playback import open_playback
 from tests.support import foreign_recordings as other
 from tests.support.foreign_recordings import COMPRESSED, PERIOD_NS, ZERO_NS, Sent, picture
 from tests.support.measured_command import run_measured

@@ -11,8 +11,7 @@ from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.calibration.failure_modes.arrangement import Misplaced, composed, misplaced, turned_corners
 from phone_host.calibration.failure_modes.remedies import arrangement_hint
 from phone_host.calibration.solve.calibrate import Sizes, calibrate
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import judge
+from phone_host.calibration.solve.verdict import Calibration, judge
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.corners import Board, Corners, agree
 from phone_host.calibration.target.pairs import BoardPair

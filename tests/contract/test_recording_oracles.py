@@ -25,7 +25,7 @@ from common.recording.ros_messages import (
     image_message,
     image_type,
 )
-from phone_host.recording.begin import camera_infos
+from phone_host.recording.recorder import camera_infos
 from phone_host.run.recording_sinks import cloud_data
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.sync.clock import ClockEstimate

@@ -21,7 +21,7 @@ import pytest
 from phone_host.api import Phase, check_model, export_model, print_model
 from phone_host.output.meshes.formats import FORMATS, mesh_bytes
 from phone_host.output.meshes.solid import Solid
-from phone_host.scene.objects import OBJECTS
+from phone_host.scene.solid import OBJECTS
 from phone_host.scene.solid import Solid as Parts
 
 pytestmark = pytest.mark.xdist_group("exported solids")  # they share the models that were scanned

@@ -9,9 +9,8 @@ import numpy as np
 
 from common.errors import DataError
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.series_snapshot import Taken, series_rig, series_views
-from phone_host.calibration.solve.view_turns import view_turns
+from phone_host.calibration.solve.series_snapshot import Taken, series_rig, series_views, view_turns
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.board_views import BoardViews, ViewPictures
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.calibration.target.small_picture import small_jpeg

@@ -4,7 +4,7 @@ from common.diagnostic import Diagnostic
 from common.errors import DataError
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.corners import agree, find_corners
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import SeenLook, look_at

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.guide.gates import Gate, Glance, View
 from phone_host.calibration.guide.guide import Guide
-from phone_host.calibration.guide.progress import Progress
-from phone_host.calibration.guide.snapshot import Ended
+from phone_host.calibration.guide.snapshot import Ended, Progress
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import BoardLook
 from phone_host.model import Rig

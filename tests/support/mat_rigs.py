@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from phone_host.model import CameraModel, Rig
-from phone_host.scene.scene import rotation
+from phone_host.scene.scene_model import rotation
 
 _BASELINE_M: Final = 0.06
 

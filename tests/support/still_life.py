@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import write_rig
-from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK
+from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK
 from phone_host.scene.scene_model import Body, Box, Plane, Pose, Scene, Sphere, Texture, rig_poses, rotation
 from phone_host.scene.scene_render import render
 from phone_host.stereo.rectify import rectify_rig

@@ -14,10 +14,9 @@ from phone_host.model import Image, Processed, RectifiedPair, StereoGeometry
 from phone_host.scan.view import View
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
-from phone_host.scene.demo_scene import PHONE_LOOK, WEBCAM_LOOK
+from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, rectified_cameras, truth
 from phone_host.scene.scene_model import Body, Box, Look, Plane, RectifiedView, Scene, Sphere, Texture
 from phone_host.scene.scene_render import render
-from phone_host.scene.truth import rectified_cameras, truth
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from phone_host.model import CameraModel, Rig
-from phone_host.scene.scene import demo_scene, render, rig_poses
+from phone_host.scene.scene import demo_scene
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import render
 from tests.support.point_files import read_pfm
 from tests.support.programs import board, host, program
 

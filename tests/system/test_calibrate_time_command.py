@@ -15,8 +15,9 @@ from phone_host.calibration.time_offset.screen import COUNT, PatternReader
 from phone_host.model import UNMEASURED_NS, TimeOffset
 from phone_host.output.rig_yaml import read_rig, write_rig
 from phone_host.scene.film import Film, render_film
-from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, Scene, demo_scene
-from phone_host.scene.scene import Path as Motion
+from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, demo_scene
+from phone_host.scene.scene_model import Path as Motion
+from phone_host.scene.scene_model import Scene
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.programs import board, free_port, host
 from tests.support.rigs import small_rig

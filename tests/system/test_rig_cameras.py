@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from common import now
+from common.camera.factory import turned
 from common.camera.replay import ReplayCamera, ReplaySettings
-from common.camera.turned import turned
 from common.camera_identity import CameraIdentity, Lock, RememberedCamera
 from common.errors import DataError
 from common.link.factory import open_link, parse_link

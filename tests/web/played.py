@@ -23,9 +23,8 @@ from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Processed, Result
 from phone_host.scan.patches import Patches
-from phone_host.scene.demo_scene import demo_scene, matched_view
+from phone_host.scene.scene import Truth, demo_scene, matched_view, rectified_cameras, truth
 from phone_host.scene.scene_render import Renderer
-from phone_host.scene.truth import Truth, rectified_cameras, truth
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings

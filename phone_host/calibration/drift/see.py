@@ -3,8 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Final
 
-from phone_host.calibration.drift.fit import fit_rows
-from phone_host.calibration.drift.rows import PARAMETERS, RowModel, Sighting
+from phone_host.calibration.drift.fit import PARAMETERS, RowModel, Sighting, fit_rows
 from phone_host.calibration.drift.watch import FEWEST_CELLS, FEWEST_FEATURES, DriftWatch, Trends
 from phone_host.model import Drift, Image, Processed
 from phone_host.stereo.core import StereoCore

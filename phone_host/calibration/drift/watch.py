@@ -12,8 +12,18 @@ from typing import Final
 
 import numpy as np
 
-from phone_host.calibration.drift.fit import Fit, fit_rows, is_better, proven
-from phone_host.calibration.drift.rows import PARAMETERS, RowModel, Sighting, Vector, departure_of, values_of
+from phone_host.calibration.drift.fit import (
+    PARAMETERS,
+    Fit,
+    RowModel,
+    Sighting,
+    Vector,
+    departure_of,
+    fit_rows,
+    is_better,
+    proven,
+    values_of,
+)
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Trend, Turn
 
 _LEAST_S: Final = 20.0

@@ -20,7 +20,7 @@ from phone_host.calibration.solve.bundle import rig_of
 from phone_host.calibration.solve.bundle_problem import Vector
 from phone_host.calibration.solve.calibrate import Sizes, fit_rig
 from phone_host.calibration.solve.calibrate_alone import calibrate_alone, prediction_errors_px, states_of, with_poses
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.corners import Board, Corners, agree
 from phone_host.calibration.target.pairs import BoardPair, Reason
 from phone_host.model import Rig, Side

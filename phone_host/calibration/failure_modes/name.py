@@ -22,8 +22,7 @@ from phone_host.calibration.failure_modes.mistakes import Mistake, mistaken
 from phone_host.calibration.failure_modes.partners import wrong_partners
 from phone_host.calibration.solve.board_in_space import BENT_SIGMAS, common_bows_m
 from phone_host.calibration.solve.calibrate import Sizes
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import REFERENCE_PX, size_factor
+from phone_host.calibration.solve.verdict import REFERENCE_PX, Calibration, size_factor
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair, Reason
 from phone_host.calibration.target.sharpness import SeenLook

@@ -7,9 +7,8 @@ from common.errors import DataError
 from common.orientation import Flip, Orientation
 from phone_host.calibration.failure_modes.arrangement import Misplaced, composed, is_contradicted
 from phone_host.calibration.failure_modes.mistakes import Mistake
-from phone_host.calibration.failure_modes.out_of_step import OutOfStep
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment, judge
+from phone_host.calibration.failure_modes.partners import OutOfStep
+from phone_host.calibration.solve.verdict import Assessment, Calibration, judge
 from phone_host.calibration.target.board_views import BoardViews, Mounted
 from phone_host.calibration.target.pairs import Rejected
 from phone_host.model import Side, Verdict

@@ -28,11 +28,23 @@ from phone_host.calibration.guide.gates import (
     sharp,
     speed_widths_s,
 )
-from phone_host.calibration.guide.progress import Progress
-from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline
-from phone_host.calibration.guide.unseen import is_guessed, unseen, with_corners
-from phone_host.calibration.guide.wants import ORDER, Placed, Want, ahead, back, is_there, missing
-from phone_host.calibration.guide.words import Speech, Words, done, taken
+from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Outline, Progress
+from phone_host.calibration.guide.wants import (
+    ORDER,
+    Placed,
+    Speech,
+    Want,
+    Words,
+    ahead,
+    back,
+    done,
+    is_guessed,
+    is_there,
+    missing,
+    taken,
+    unseen,
+    with_corners,
+)
 from phone_host.calibration.solve.verdict import Assessment
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import BoardLook
@@ -304,7 +316,7 @@ class Guide:
 
     def _rank(self, want: Want) -> tuple[int, float, int]:
         after_m = math.nan if self._progress is None else self._progress.after_m(want)
-        known = self._progress is not None and any(math.isfinite(each.after_m) for each in self._progress.taught)
+        known = self._progress is not None and any(map(math.isfinite, self._progress.taught.values()))
         teaches = (after_m if math.isfinite(after_m) else math.inf) if known else 0.0
         return self._given_up[want], teaches, ORDER.index(want)
 

@@ -1,16 +1,23 @@
-"""The views that a calibration needs, when one of them is there, and what a person is told until it is. Pure.
+"""The views that a calibration needs, when one of them is there, which image corners nobody has shown, and all that a person is told until then. Pure.
 
 Left, right, top and bottom are those of the pictures as the cameras take them, not mirrored. A place counts where it is
 reached in the picture in which the board is nearer to that edge: the two pictures overlap, so only one of them can show the
 board at its outer edge.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-from phone_host.calibration.guide.coverage import Depth, Placement
+from common.words import counted
+from phone_host.calibration.guide.coverage import Depth, Placement, placement
+from phone_host.calibration.solve.bundle_problem import Bend
 from phone_host.calibration.solve.next_view import Spot
+from phone_host.calibration.solve.verdict import Assessment, Calibration
+from phone_host.calibration.target.corners import Board
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.model import CameraModel, Verdict
 
 _TILT_DEG, _ASKED_TILT_DEG = 18.0, 30.0
 """A board counts as tilted from the first on; the second is what is imagined. Below 15 a focal length is hardly told from a
@@ -190,3 +197,103 @@ def _reached(placed: Placed, x: int, y: int) -> bool:
         (each.low[axis] if x + y < 0 else 1 - each.high[axis]) - each.square[axis] <= _EDGE
         for each in (placed.left, placed.right)
     )
+
+
+def unseen(places: Iterable[Placed]) -> frozenset[Want]:
+    """Return the image corners that no board reaches."""
+    left = set(CORNERS)
+    for placed in places:
+        left -= {want for want in left if is_seen(want, placed)}
+    return frozenset(left)
+
+
+def unseen_in(pairs: Iterable[BoardPair], board: Board, left: CameraModel, right: CameraModel) -> frozenset[Want]:
+    """Return the image corners that the board reaches in none of some pairs; of the cameras only the sizes count."""
+    return unseen(
+        Placed(placement(pair.left_px, board, left), placement(pair.right_px, board, right)) for pair in pairs
+    )
+
+
+def guessed_corners(found: Calibration, pairs: Iterable[BoardPair], board: Board) -> frozenset[Want]:
+    """Return the image corners that the board reaches in none of the pairs (as they were seen) that a calibration used, if a lens is guessed there."""
+    if not is_guessed(found.bends):
+        return frozenset()
+    used = {each.name for each in found.used}
+    return unseen_in((pair for pair in pairs if pair.name in used), board, found.rig.left, found.rig.right)
+
+
+def is_guessed(bends: Iterable[Bend]) -> bool:
+    """Return whether a lens may bend freely where nothing was seen: one of more than four coefficients.
+
+    Beyond what was seen the powers of the fifth coefficient and more run away; four stay near the truth, because webcams' lenses follow them.
+    """
+    return any(bend is not Bend.USUAL for bend in bends)
+
+
+def with_corners(judgement: Assessment, missing: Iterable[Want]) -> Assessment:
+    """Return a verdict that promises nothing of what was not seen: good becomes usable where corners are missing."""
+    names = [want.value for want in ORDER if want in set(missing)]
+    if judgement.verdict is not Verdict.GOOD or not names:
+        return judgement
+    where = " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+    remedy = f"no board was seen in the {where} of the pictures, so the lens is guessed there: take views with it there"
+    return Assessment(Verdict.USABLE, remedy)
+
+
+class Words(Enum):
+    """What a person is told; beside these: what a wanted view lacks, and `taken`."""
+
+    SHOW_BOTH = "show the whole board to both cameras"
+    SHOW_LEFT = "the left camera sees too little of the board: move it to the left, or farther away"
+    SHOW_RIGHT = "the right camera sees too little of the board: move it to the right, or farther away"
+    PART = "show more of the board"
+    SAME = "both cameras show the same picture: choose two different cameras"
+    HELP = "no board found: more light, no glare, the whole board with its white margin; or name its inner corners"
+    STILL = "hold still"
+    BLURRED = "too blurred: hold still, more light"
+    GLARE = "glare: turn the board a little"
+    ELSEWHERE = "move the board a little"
+
+
+def taken(views: int) -> str:
+    """Return what is said when a view is taken."""
+    return f"taken, {views}"
+
+
+def done(verdict: str, views: int) -> str:
+    """Return what is said at the end."""
+    return f"done: verdict {verdict}" if verdict else f"done: {counted(views, 'view')}"
+
+
+_STEADY_NS: Final = 400_000_000
+"""The reason for new words must last so long: a board may be between two looks."""
+
+_READ_NS: Final = 1_000_000_000
+"""So long words stand: nobody reads, or follows, what changes faster."""
+
+
+class Speech:
+    """What is being said. Words change only when a person has had the time to read them."""
+
+    def __init__(self) -> None:
+        self.words = ""
+        self._since_ns = self._next_since_ns = 0
+        self._next = ""
+
+    def say(self, wanted: str, now_ns: int, *, is_news: bool) -> str:
+        """Return what is said now.
+
+        Args:
+            wanted: what is to be said; empty: nothing new.
+            now_ns: now.
+            is_news: whether it is said at once, whatever stands: a view was taken, or all is done.
+        """
+        if wanted != self._next:
+            self._next, self._next_since_ns = wanted, now_ns
+        if not wanted or wanted == self.words:
+            return self.words
+        # A hand that is to hold still has gone on a moment later.
+        is_steady = wanted == Words.STILL.value or now_ns - self._next_since_ns >= _STEADY_NS
+        if is_news or not self.words or (is_steady and now_ns - self._since_ns >= _READ_NS):
+            self.words, self._since_ns = wanted, now_ns
+        return self.words

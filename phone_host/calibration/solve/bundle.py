@@ -26,13 +26,14 @@ from numpy.typing import NDArray
 from phone_host.calibration.solve.bundle_problem import (
     GLOBALS,
     BundleState,
-    BundleView,
     RigProblem,
     Vector,
     errors_of,
+    left_alone,
 )
-from phone_host.geometry.rig_pixels import LEFT, RIGHT
-from phone_host.geometry.schur import inverse_of, minimise
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.geometry.lens import LEFT, RIGHT
+from phone_host.geometry.schur import Flags, inverse_of, minimise
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Lens, Rig
 
@@ -179,25 +180,6 @@ def _covariance(inverse: Vector, pulls: Vector, moves: Vector) -> Vector:
     return np.asarray(spread @ spread.T, np.float64)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FreeParameters:
-    """What is estimated beside the poses of the boards.
-
-    Attributes:
-        left: (12,) of the left camera's parameters, in the order of `geometry.lens`.
-        right: (12,) of the right camera's.
-        pose: whether the relative pose is.
-    """
-
-    left: NDArray[np.bool_]
-    right: NDArray[np.bool_]
-    pose: bool = True
-
-    def flags(self) -> NDArray[np.bool_]:
-        """Return (30,) one flag per shared parameter."""
-        return np.concatenate([self.left, self.right, np.full(6, self.pose)])
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BundleResult:
     """The optimum and its uncertainty.
@@ -228,11 +210,17 @@ class BundleResult:
 
     def view_rms_px(self) -> tuple[Vector, Vector]:
         """Return the root mean square distance of each view, (V,) px, left and right."""
-        left, right = (
-            np.sqrt(np.nanmean((errors**2).sum(axis=2), axis=1))
-            for errors in (self.left_errors_px, self.right_errors_px)
-        )
-        return left, right
+        return view_rms_px(self.left_errors_px), view_rms_px(self.right_errors_px)
+
+
+def free_flags(left: Flags, right: Flags, *, pose: bool = True) -> Flags:
+    """Return (30,) which shared parameters are estimated: those of the cameras, (12,) each, and whether the relative pose is."""
+    return np.concatenate([left, right, np.full(6, pose)])
+
+
+def view_rms_px(errors: Vector) -> Vector:
+    """Return the root mean square length of each view's errors (V, N, 2), (V,) px; NaN is left out."""
+    return np.asarray(np.sqrt(np.nanmean((errors**2).sum(axis=2), axis=1)), np.float64)
 
 
 def rig_of(state: BundleState) -> Rig:
@@ -251,7 +239,7 @@ def rms_px(*errors: Vector) -> float:
     return float(np.sqrt(np.nanmean((stacked**2).sum(axis=1))))
 
 
-def adjust(views: list[BundleView], points_m: Vector, start: BundleState, free: FreeParameters) -> BundleResult:
+def adjust(views: list[BoardPair], points_m: Vector, start: BundleState, free: Flags) -> BundleResult:
     """Find the rig that best explains the corners.
 
     Args:
@@ -260,11 +248,11 @@ def adjust(views: list[BundleView], points_m: Vector, start: BundleState, free: 
         start: a state close enough: each camera calibrated alone, the relative pose of any one view.
         free: what is estimated; all else keeps its start value.
     """
-    flags, prior, state = free.flags(), _prior(start), start
+    prior, state = _prior(start), start
     problem = _problem(views, points_m, state, prior)
     for _ in range(_MOST_PASSES):
         before = problem.sigmas_px
-        state = minimise(problem, state, flags)
+        state = minimise(problem, state, free)
         problem = _problem(views, points_m, state, prior)
         if np.allclose(problem.sigmas_px, before, rtol=_SAME_NOISE, atol=0):
             break
@@ -273,28 +261,26 @@ def adjust(views: list[BundleView], points_m: Vector, start: BundleState, free: 
         state=state,
         left_errors_px=left,
         right_errors_px=right,
-        covariance=covariance_of(problem, state, flags),
+        covariance=covariance_of(problem, state, free),
     )
 
 
-def fit_poses(views: list[BundleView], points_m: Vector, state: BundleState) -> BundleResult:
+def fit_poses(views: list[BoardPair], points_m: Vector, state: BundleState) -> BundleResult:
     """Fit the boards' poses alone to views of a rig that is known."""
-    nothing = FreeParameters(np.zeros(RIGHT.start, bool), np.zeros(RIGHT.start, bool), pose=False)
     problem = _problem(views, points_m, state, _prior(state))
-    fitted = minimise(problem, state, nothing.flags(), ROUGHLY)
+    fitted = minimise(problem, state, np.zeros(GLOBALS, bool), ROUGHLY)
     left, right = errors_of(views, points_m, fitted)
     return BundleResult(state=fitted, left_errors_px=left, right_errors_px=right)
 
 
 def adjust_alone(views: list[Vector], points_m: Vector, start: BundleState, free: NDArray[np.bool_]) -> BundleState:
     """Adjust a single camera, roughly: the left one of a rig whose right one sees nothing."""
-    unseen = [BundleView(corners, np.full(corners.shape, np.nan)) for corners in views]
-    return adjust_roughly(unseen, points_m, start, FreeParameters(free, np.zeros_like(free), pose=False))
+    return adjust_roughly(left_alone(views), points_m, start, free_flags(free, np.zeros_like(free), pose=False))
 
 
-def adjust_roughly(views: list[BundleView], points_m: Vector, start: BundleState, free: FreeParameters) -> BundleState:
+def adjust_roughly(views: list[BoardPair], points_m: Vector, start: BundleState, free: Flags) -> BundleState:
     """Do what `adjust` does, where the start is close, nothing is wrong any more and no uncertainty is asked for."""
-    return minimise(_problem(views, points_m, start, _prior(start)), start, free.flags(), ROUGHLY)
+    return minimise(_problem(views, points_m, start, _prior(start)), start, free, ROUGHLY)
 
 
 def alone_state(model: CameraModel, poses: Vector) -> BundleState:
@@ -304,7 +290,7 @@ def alone_state(model: CameraModel, poses: Vector) -> BundleState:
     )
 
 
-def _problem(views: list[BundleView], points_m: Vector, state: BundleState, prior: tuple[Vector, Vector]) -> RigProblem:
+def _problem(views: list[BoardPair], points_m: Vector, state: BundleState, prior: tuple[Vector, Vector]) -> RigProblem:
     """Return the problem with each camera's noise as it is at a state."""
     sigmas = tuple(_sigma_px(errors) for errors in errors_of(views, points_m, state))
     return RigProblem(views, points_m, prior, (sigmas[0], sigmas[1]))

@@ -1,21 +1,66 @@
-"""The least-squares problem of a rig: what is estimated, how it predicts the corners, and the derivatives. Pure.
+"""The least-squares problem of a rig: what is estimated, how freely a lens may bend, how it predicts the corners, and the derivatives. Pure.
 
-Shared parameters: the thirty of a rig (`geometry.rig_pixels`). Blocks: one board pose each, moved by a small turn about the left
+Shared parameters: the thirty of a rig (`geometry.lens`). Blocks: one board pose each, moved by a small turn about the left
 camera's axes and a translation.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.geometry.lens import PARAMETERS, parameters_of, project, project_linearised, with_parameters
-from phone_host.geometry.rig_pixels import LEFT, RIG, RIGHT
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.geometry.lens import (
+    LEFT,
+    PARAMETERS,
+    RIG,
+    RIGHT,
+    parameters_of,
+    project,
+    project_linearised,
+    with_parameters,
+)
 from phone_host.geometry.schur import NormalEquations, eliminated
 from phone_host.geometry.se3 import cross_matrices, rotations_of, vectors_of
-from phone_host.model import RIG_PARAMETERS, CameraModel
+from phone_host.model import RIG_PARAMETERS, CameraModel, Lens
+
+
+class Bend(Enum):
+    """Which coefficients are estimated, the simplest first.
+
+    Attributes:
+        USUAL: k1 k2 p1 p2, as the lenses of webcams and phones need.
+        WIDE: k3 as well. Without it, a wide lens's views of the image's corners look like wrong corners.
+        RATIONAL: k4 k5 k6 as well.
+        FISHEYE: k1 k2 k3 k4 of the angle.
+    """
+
+    USUAL = "usual"
+    WIDE = "wide"
+    RATIONAL = "rational"
+    FISHEYE = "fisheye"
+
+    @property
+    def lens(self) -> Lens:
+        """The formula that these coefficients belong to."""
+        return {Bend.RATIONAL: Lens.RATIONAL, Bend.FISHEYE: Lens.FISHEYE}.get(self, Lens.PINHOLE)
+
+    @property
+    def terms(self) -> int:
+        """The number of coefficients that are estimated."""
+        return _TERMS[self]
+
+    def free(self) -> NDArray[np.bool_]:
+        """Return (12,) which parameters of the camera are estimated, in the order of `geometry.lens`."""
+        return np.arange(PARAMETERS) < 4 + self.terms
+
+
+_TERMS: Final = {Bend.USUAL: 4, Bend.WIDE: 5, Bend.RATIONAL: 8, Bend.FISHEYE: 4}
+
 
 Vector = NDArray[np.float64]
 
@@ -26,19 +71,6 @@ _Side = tuple[NDArray[np.intp], Vector, Vector, Vector]
 
 HUBER_SIGMAS: Final = 2.5
 """Huber's threshold in standard deviations: Gaussian noise loses 1 % of its information."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BundleView:
-    """One pair of board views.
-
-    Attributes:
-        left_px: (N, 2) float64 corners; NaN where one is not seen.
-        right_px: (N, 2) float64 corners in the same order.
-    """
-
-    left_px: Vector
-    right_px: Vector
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -60,6 +92,11 @@ class BundleState:
     poses: Vector
 
 
+def left_alone(views: Sequence[Vector]) -> list[BoardPair]:
+    """Return corners (N, 2) that one camera saw as pairs whose right camera sees nothing."""
+    return [BoardPair("", corners, np.full(corners.shape, np.nan)) for corners in views]
+
+
 def globals_of(state: BundleState) -> Vector:
     """Return the (30,) shared parameters of a state; the small turn is 0."""
     return np.concatenate([parameters_of(state.left), parameters_of(state.right), np.zeros(3), state.translation_m])
@@ -72,7 +109,7 @@ def project_view(state: BundleState, pose: Vector, points_m: Vector) -> tuple[Ve
     return project(left, state.left), project(right, state.right)
 
 
-def errors_of(views: list[BundleView], points_m: Vector, state: BundleState) -> tuple[Vector, Vector]:
+def errors_of(views: list[BoardPair], points_m: Vector, state: BundleState) -> tuple[Vector, Vector]:
     """Return measured minus projected corners, (V, N, 2) px, left and right; NaN where a corner was not seen."""
     left, right = _points(points_m, state)
     shape = (len(views), len(points_m), 2)
@@ -123,7 +160,7 @@ class RigProblem:
         sigmas_px: standard deviation of one coordinate of a corner, left and right.
     """
 
-    views: list[BundleView]
+    views: list[BoardPair]
     points_m: Vector
     prior: tuple[Vector, Vector]
     sigmas_px: tuple[float, float]

@@ -17,10 +17,9 @@ import numpy as np
 
 from common.errors import DataError
 from common.program.out_of_memory import is_out_of_memory
-from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_pose import fit_pose
-from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, adjust
-from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem, Vector
+from phone_host.calibration.solve.bundle import BundleResult, adjust, free_flags
+from phone_host.calibration.solve.bundle_problem import GLOBALS, Bend, BundleState, RigProblem, Vector
 from phone_host.calibration.solve.calibrate_alone import (
     LoneCamera,
     calibrate_alone,
@@ -32,11 +31,11 @@ from phone_host.calibration.solve.calibrate_alone import (
 )
 from phone_host.calibration.solve.fitted_rig import Bends, Fitted, misfits, summed_up
 from phone_host.calibration.solve.lens_choice import choose_lens, grows, is_fisheye
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
-from phone_host.geometry.lens import PARAMETERS
-from phone_host.geometry.rig_pixels import RIG
+from phone_host.geometry.lens import PARAMETERS, RIG
+from phone_host.geometry.schur import Flags
 from phone_host.geometry.se3 import SE3, rotations_of
 from phone_host.model import CameraModel, Lens, Rig, Side
 
@@ -195,12 +194,12 @@ def _with_chosen_lenses(fitted: Fitted, pairs: list[BoardPair], points_m: Vector
     fitted = replace(fitted, trials=(tuple(found[0][1]), tuple(found[1][1])))
     if bends == fitted.bends:
         return fitted
-    free = FreeParameters(bends[0].free(), bends[1].free())
+    free = free_flags(bends[0].free(), bends[1].free())
     cameras = [
         trial.model if trial.bend is not bend else model
         for (trial, _), bend, model in zip(found, fitted.bends, (state.left, state.right), strict=True)
     ]
-    result = adjust(fitted.views(), points_m, replace(state, left=cameras[0], right=cameras[1]), free)
+    result = adjust(fitted.kept, points_m, replace(state, left=cameras[0], right=cameras[1]), free)
     if not _both_grow(result.state) or result.rms_px() > (1 + _CHANCE_LOSS) * fitted.result.rms_px():
         return fitted
     chosen = replace(fitted, result=result, bends=bends, free=free)
@@ -250,13 +249,13 @@ def _agreed_start(
 
 
 def _adjust_robustly(
-    pairs: list[BoardPair], points_m: Vector, start: BundleState, bends: Bends, known: FreeParameters | None = None
+    pairs: list[BoardPair], points_m: Vector, start: BundleState, bends: Bends, known: Flags | None = None
 ) -> Fitted:
     """Adjust, reject the worst pair and adjust again until all fit. With `known`, only what it says is estimated."""
     rejected: list[Rejected] = []
     while True:
-        free = FreeParameters(bends[0].free(), bends[1].free()) if known is None else known
-        result = adjust([BundleView(pair.left_px, pair.right_px) for pair in pairs], points_m, start, free)
+        free = free_flags(bends[0].free(), bends[1].free()) if known is None else known
+        result = adjust(pairs, points_m, start, free)
         found = misfits(pairs, result, points_m)
         if not found:
             return Fitted(result=result, kept=pairs, rejected=rejected, bends=bends, free=free)
@@ -280,7 +279,7 @@ def _fit_of_known_lenses(pairs: list[BoardPair], points_m: Vector, rig: Rig, ben
     )
     start, kept, rejected = _agreed_start(pairs, points_m, left, right)
     nothing = np.zeros(PARAMETERS, bool)
-    fitted = _adjust_robustly(kept, points_m, start, bends, FreeParameters(nothing, nothing))
+    fitted = _adjust_robustly(kept, points_m, start, bends, free_flags(nothing, nothing))
     return replace(fitted, rejected=[*rejected, *fitted.rejected])
 
 
@@ -303,9 +302,7 @@ def solve_pose(pairs: list[BoardPair], board: Board, earlier: Rig) -> Calibratio
     """
     points_m = board.points_m()
     fitted = _fit_of_known_lenses(pairs, points_m, earlier, (_bend(earlier.left), _bend(earlier.right)))
-    covariance = _carried(
-        fitted.result, [BundleView(pair.left_px, pair.right_px) for pair in fitted.kept], points_m, earlier
-    )
+    covariance = _carried(fitted.result, fitted.kept, points_m, earlier)
     fitted = replace(fitted, result=replace(fitted.result, covariance=covariance))
     return summed_up(fitted, points_m=points_m, board_side=earlier.board_side)
 
@@ -319,12 +316,12 @@ def _bend(model: CameraModel) -> Bend:
     return Bend.WIDE if model.distortion.size == Bend.WIDE.terms and model.distortion[-1] else Bend.USUAL
 
 
-def _carried(result: BundleResult, views: list[BundleView], points_m: Vector, earlier: Rig) -> Vector:
+def _carried(result: BundleResult, pairs: list[BoardPair], points_m: Vector, earlier: Rig) -> Vector:
     """Return the covariance of lenses and pose together: what the corners leave open of the pose, and what the lenses do."""
     lenses = earlier.covariance[: RIG.start, : RIG.start]
     errors = (result.left_errors_px, result.right_errors_px)
     sigmas = [max(float(np.sqrt(np.nanmean(each**2))), 1e-6) for each in errors]
-    problem = RigProblem(views, points_m, (np.zeros(GLOBALS), np.zeros(GLOBALS)), (sigmas[0], sigmas[1]))
+    problem = RigProblem(pairs, points_m, (np.zeros(GLOBALS), np.zeros(GLOBALS)), (sigmas[0], sigmas[1]))
     whole = problem.linearised(result.state).reduced(0.0, np.ones(GLOBALS, bool))[0]
     by_lens = -np.linalg.solve(whole[RIG, RIG], whole[RIG, : RIG.start])
     covariance = result.covariance.copy()

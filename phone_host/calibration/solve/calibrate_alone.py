@@ -12,10 +12,9 @@ import cv2
 import numpy as np
 
 from common.errors import DataError
-from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_pose import fit_pose, rough_pose
 from phone_host.calibration.solve.bundle import adjust_alone, alone_state, rms_px
-from phone_host.calibration.solve.bundle_problem import BundleState, Vector, project_view
+from phone_host.calibration.solve.bundle_problem import Bend, BundleState, Vector, project_view
 from phone_host.calibration.target.corners import Corners
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.geometry.lens import project

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.pairs import BoardPair

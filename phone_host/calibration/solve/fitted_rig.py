@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_in_space import boards_in_space, fit_bent, misses, ray_crossings
-from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, adjust, adjust_roughly, rig_of, rms_px
-from phone_host.calibration.solve.bundle_problem import BundleState, BundleView, Vector
+from phone_host.calibration.solve.bundle import BundleResult, adjust, adjust_roughly, rig_of, rms_px
+from phone_host.calibration.solve.bundle_problem import Bend, BundleState, Vector
 from phone_host.calibration.solve.calibrate_alone import FAR_OFF_PX, corners_of, off_words, own_errors_px
 from phone_host.calibration.solve.next_view import DEPTHS_M, depth_sigma_m, next_view, zero_sigma_px
-from phone_host.calibration.solve.result import Calibration, LensTrial, Squares, Used
+from phone_host.calibration.solve.verdict import Calibration, LensTrial, Squares, Used
 from phone_host.calibration.target.corners import Corners
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
+from phone_host.geometry.schur import Flags
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel, Rectification, Rig, Side
 from phone_host.stereo.rectify import across_lines_px, rectify_points, rectify_rig
@@ -112,14 +112,14 @@ def rms(values: Vector) -> float:
     return float(np.sqrt((values**2).mean())) if values.size else float("nan")
 
 
-def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleState, free: FreeParameters) -> Squares:
+def held_out_squares(pairs: list[BoardPair], points_m: Vector, state: BundleState, free: Flags) -> Squares:
     """Measure the squares of every pair by a rig that has not seen it."""
     true_m = _side_m(points_m)
     sides: list[Vector] = []
     parts = min(_PARTS, len(pairs)) if len(pairs) >= _LEAST_PAIRS else 0
     for part in range(parts):
         out = np.arange(len(pairs)) % parts == part
-        kept = [BundleView(pair.left_px, pair.right_px) for pair, held in zip(pairs, out, strict=True) if not held]
+        kept = [pair for pair, is_held in zip(pairs, out, strict=True) if not is_held]
         rig = rig_of(adjust_roughly(kept, points_m, replace(state, poses=state.poses[~out]), free))
         held = [pair for pair, is_held in zip(pairs, out, strict=True) if is_held]
         sides.append(square_sides_m(held, points_m, rig))
@@ -156,19 +156,15 @@ class Fitted:
     kept: list[BoardPair]
     rejected: list[Rejected]
     bends: Bends
-    free: FreeParameters
+    free: Flags
     trials: tuple[tuple[LensTrial, ...], tuple[LensTrial, ...]] = ((), ())
-
-    def views(self) -> list[BundleView]:
-        """The pairs that are used, as the adjustment takes them."""
-        return [BundleView(pair.left_px, pair.right_px) for pair in self.kept]
 
 
 def summed_up(fitted: Fitted, *, points_m: Vector, board_side: Side) -> Calibration:
     """Make a rig and its figures from the optimum."""
     result, pairs, flat_m = fitted.result, fitted.kept, points_m
     boards = boards_in_space(pairs, flat_m, rig_of(result.state), result.state.poses, result.sigmas_px())
-    bent = fit_bent(result, flat_m, boards, lambda shape_m, start: adjust(fitted.views(), shape_m, start, fitted.free))
+    bent = fit_bent(result, flat_m, boards, lambda shape_m, start: adjust(fitted.kept, shape_m, start, fitted.free))
     if bent is not None:
         result, points_m = bent.result, bent.points_m
         boards = boards_in_space(pairs, flat_m, rig_of(result.state), result.state.poses, result.sigmas_px())

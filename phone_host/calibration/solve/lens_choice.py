@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.calibration.solve.bend import Bend
 from phone_host.calibration.solve.board_pose import fit_pose
-from phone_host.calibration.solve.bundle import adjust_alone, alone_state, fit_poses
-from phone_host.calibration.solve.bundle_problem import BundleState, BundleView, Vector, errors_of
+from phone_host.calibration.solve.bundle import adjust_alone, alone_state, fit_poses, view_rms_px
+from phone_host.calibration.solve.bundle_problem import Bend, BundleState, Vector, errors_of, left_alone
 from phone_host.calibration.solve.calibrate_alone import fisheye_camera
-from phone_host.calibration.solve.result import LensTrial
+from phone_host.calibration.solve.verdict import LensTrial
 from phone_host.calibration.target.corners import Corners
 from phone_host.geometry.lens import farthest_angle, parameters_of, rays_through, with_parameters
 from phone_host.model import CameraModel, Lens
@@ -149,9 +148,7 @@ def _start(views: list[Corners], points_m: Vector, start: BundleState, bend: Ben
 
 def _errors_px(views: list[Corners], points_m: Vector, state: BundleState) -> Vector:
     """Return each view's root mean square error, (V,) px."""
-    unseen = [BundleView(corners, np.full(corners.shape, np.nan)) for corners in views]
-    errors = errors_of(unseen, points_m, state)[0]
-    return np.asarray(np.sqrt(np.nanmean((errors**2).sum(axis=2), axis=1)), np.float64)
+    return view_rms_px(errors_of(left_alone(views), points_m, state)[0])
 
 
 def _is_less(rich_px: Vector, plain_px: Vector) -> bool:
@@ -165,9 +162,7 @@ def _predicted(
     kept = [corners for corners, held in zip(views, out, strict=True) if not held]
     held = [corners for corners, held in zip(views, out, strict=True) if held]
     fitted = adjust_alone(kept, points_m, alone_state(whole.left, whole.poses[~out]), bend.free())
-    unseen = [BundleView(corners, np.full(corners.shape, np.nan)) for corners in held]
-    errors = fit_poses(unseen, points_m, alone_state(fitted.left, whole.poses[out])).left_errors_px
-    return np.asarray(np.sqrt(np.nanmean((errors**2).sum(axis=2), axis=1)), np.float64)
+    return view_rms_px(fit_poses(left_alone(held), points_m, alone_state(fitted.left, whole.poses[out])).left_errors_px)
 
 
 def _is_better(rich: LensTrial, plain: LensTrial) -> bool:

@@ -4,7 +4,7 @@ The covariance of the parameters is carried through to first order:
 
     variance of a disparity = J C J^T,  J = its derivative by the parameters.
 
-J is exact (`geometry.rig_pixels`). A point at infinity has D = d + doffs = 0 in an exact rig; in a
+J is exact (`geometry.lens`). A point at infinity has D = d + doffs = 0 in an exact rig; in a
 calibrated one its sigma, the noise of zero, decides how far the rig can see, because depth is f b / D.
 
 For each kind of view, some are imagined: where the board would stand, which corners both cameras would see. What they would add is
@@ -19,16 +19,17 @@ from typing import Final, assert_never
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, rig_of
+from phone_host.calibration.solve.bundle import BundleResult, rig_of
 from phone_host.calibration.solve.bundle_problem import (
     GLOBALS,
     BundleState,
-    BundleView,
     RigProblem,
     Vector,
     project_view,
 )
-from phone_host.geometry.rig_pixels import pixel_derivatives
+from phone_host.calibration.target.pairs import BoardPair
+from phone_host.geometry.lens import pixel_derivatives
+from phone_host.geometry.schur import Flags
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
 from phone_host.model import CameraModel, Epipolar, Rectification, Rig
 
@@ -132,9 +133,7 @@ class NextView:
     after_m: float
 
 
-def next_view(
-    result: BundleResult, free: FreeParameters, points_m: Vector, rectification: Rectification
-) -> NextView | None:
+def next_view(result: BundleResult, free: Flags, points_m: Vector, rectification: Rectification) -> NextView | None:
     """Find out which view would teach a calibration most.
 
     Returns:
@@ -144,7 +143,7 @@ def next_view(
     lesson = Lesson(
         state=result.state,
         covariance=result.covariance,
-        flags=free.flags(),
+        flags=free,
         sigmas_px=(sigmas[0], sigmas[1]),
         points_m=points_m,
         rectification=rectification,
@@ -242,7 +241,7 @@ def _sigma_m(covariance: Vector, state: BundleState, rectification: Rectificatio
     return depth_sigma_m(replace(rig_of(state), covariance=covariance), rectification, DEPTH_M)
 
 
-def _imagined(state: BundleState, pose: Vector, points_m: Vector) -> BundleView | None:
+def _imagined(state: BundleState, pose: Vector, points_m: Vector) -> BoardPair | None:
     """Return what both cameras would see of a board; None if one sees too little of it."""
     seen = []
     for model, pixels in zip((state.left, state.right), project_view(state, pose, points_m), strict=True):
@@ -251,7 +250,7 @@ def _imagined(state: BundleState, pose: Vector, points_m: Vector) -> BundleView 
         if inside.mean() < _LEAST_SEEN:
             return None
         seen.append(np.where(inside[:, np.newaxis], pixels, np.nan))
-    return BundleView(seen[0], seen[1])
+    return BoardPair("", seen[0], seen[1])
 
 
 def _poses(kind: Kind, state: BundleState, points_m: Vector) -> Vector:

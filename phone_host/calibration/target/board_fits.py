@@ -1,16 +1,52 @@
-"""Checks in some images which size of chessboard fits them: what was seen of a board may be a part of it.
+"""Checks in some images, several at a time, which size of chessboard fits them: what was seen of a board may be a part of it.
 
 A detector that grows a lattice ends early at glare, a hand or a narrow margin, and in many images at the same row. The detector that
 looks for a size finds it there nevertheless. It finds parts of a board, too; so the largest size that fits is the board's.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, TypeVar
+
+import cv2
 
 from phone_host.calibration.target.corners import Board, find_corners, is_outlined
-from phone_host.calibration.target.threads import side_by_side
 from phone_host.model import Image
+
+A = TypeVar("A")
+B = TypeVar("B")
+
+_MOST_THREADS: Final = 4
+"""Each may hold an image of 50 megapixels (150 MB) and its copies."""
+
+
+def side_by_side(work: Callable[[A], B], things: Sequence[A], advance: Callable[[], None] = lambda: None) -> list[B]:
+    """Do the same to all things.
+
+    Args:
+        work: what to do; must not touch what another call changes.
+        things: to what.
+        advance: called in this thread after each, in order, for a progress bar.
+
+    Returns:
+        The results, in the order of the things.
+
+    Raises:
+        Exception: whatever `work` raises first; what has not begun is not done.
+    """
+    results: list[B] = []
+    with ThreadPoolExecutor(min(_MOST_THREADS, max(1, cv2.getNumberOfCPUs())), thread_name_prefix="boards") as pool:
+        waiting = [pool.submit(work, each) for each in things]
+        try:
+            for each in waiting:
+                results.append(each.result())
+                advance()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return results
+
 
 Inner = tuple[int, int]
 """How many inner corners a chessboard has each way: the larger count first."""

@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from common.errors import DataError, SettingsError, TandemError
 from common.imagesize.head import MOST_PIXELS, size_text
 from common.words import counted
-from phone_host.calibration.target.board_fits import ENOUGH, Fits, Inner
+from phone_host.calibration.target.board_fits import ENOUGH, Fits, Inner, side_by_side
 from phone_host.calibration.target.corners import Board, Corners
 from phone_host.calibration.target.marks_seen import SeenMarks, find_marks, require_marks
 from phone_host.calibration.target.small_picture import shrunk
-from phone_host.calibration.target.threads import side_by_side
 from phone_host.model import Image
 from phone_host.stereo.images import decode_file, open_image, to_grey
 from phone_host.stereo.view_files import ViewFiles

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -13,13 +13,17 @@ from common.imagesize.head import MOST_PIXELS
 from common.imagesize.head import size_text as px_text
 from common.orientation import UPRIGHT, Flip, Orientation
 from common.program.out_of_memory import noted_if_out_of_memory
+from phone_host.calibration.target.board_fits import side_by_side
 from phone_host.calibration.target.corners import Board, Corners, agree, find_corners
 from phone_host.calibration.target.pairs import BoardPair, FileCorners, Reason, Rejected
 from phone_host.calibration.target.sharpness import BoardLook, SeenLook, look_at
-from phone_host.calibration.target.small_picture import PREVIEW_PX, small_jpeg
-from phone_host.calibration.target.threads import side_by_side
-from phone_host.model import Side
+from phone_host.calibration.target.small_picture import PREVIEW_PX, shrunk_to, small_jpeg, small_size
+from phone_host.model import CameraModel, Rectification, Rig, Side
+from phone_host.model.calibration_series import RectifiedView
 from phone_host.stereo.images import decode_file, open_image, to_grey
+from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectify import rectify_points
+from phone_host.stereo.scaled_rig import scaled_rig
 from phone_host.stereo.view_files import ViewFiles
 
 _FIRST: Final = 50
@@ -261,3 +265,75 @@ def _usual(seen: list[_Seen]) -> _Seen:
     """Return one of the images whose size and orientation most images have."""
     usual = Counter((each.size_px, each.turned) for each in seen).most_common(1)[0][0]
     return next(each for each in seen if (each.size_px, each.turned) == usual)
+
+
+_MOST_PX: Final = 640
+"""Longer side of the images that are rectified, px: enough for a page, and rectifying 12 megapixels takes a second."""
+
+
+def fullest(pairs: list[BoardPair], rig: Rig, rectification: Rectification) -> BoardPair:
+    """Return the pair whose board fills most of both rectified images and is whole in them."""
+
+    def filled(pair: BoardPair) -> tuple[float, float]:
+        shares, areas = [], []
+        for corners, model, turn in (
+            (pair.left_px, rig.left, rectification.R_left),
+            (pair.right_px, rig.right, rectification.R_right),
+        ):
+            seen = corners[np.isfinite(corners).all(axis=1)]
+            at = rectify_points(seen, model, turn, rectification.geometry)
+            inside = np.all((at > 0) & (at < (rectification.width_px - 1, rectification.height_px - 1)), axis=1)
+            shares.append(float(inside.sum()) / len(corners))
+            areas.append(float(np.prod(np.ptp(at, axis=0))))
+        return round(min(shares), 2), min(areas)
+
+    return max(pairs, key=filled)
+
+
+def rectified_view(
+    files: tuple[Path, Path],
+    pair: BoardPair,
+    rig: Rig,
+    mounted: tuple[Orientation, Orientation] = (UPRIGHT, UPRIGHT),
+    most_pixels: int = MOST_PIXELS,
+) -> RectifiedView | None:
+    """Rectify one pair at a small size.
+
+    Returns:
+        The pair; None if a file has gone, or the rig cannot be rectified so small.
+    """
+    sizes = [small_size((model.width_px, model.height_px), _MOST_PX) for model in (rig.left, rig.right)]
+    try:
+        images = [
+            shrunk_to(decode_file(open_image(path, most_pixels, turn)), size)
+            for path, turn, size in zip(files, mounted, sizes, strict=True)
+        ]
+        small = scaled_rig(replace(rig, is_cropped=False), sizes[0], sizes[1])
+        rectifier = Rectifier(small)
+    except DataError:
+        return None
+    rectified = rectifier.rectify(images[0], images[1])
+    made, geometry = rectifier.rectification, rectifier.geometry
+    seen = np.isfinite(pair.left_px).all(axis=1) & np.isfinite(pair.right_px).all(axis=1)
+    corners = [
+        rectify_points(_scaled(own_px[seen], own, model), model, turn, geometry)
+        for own_px, own, model, turn in (
+            (pair.left_px, rig.left, small.left, made.R_left),
+            (pair.right_px, rig.right, small.right, made.R_right),
+        )
+    ]
+    return RectifiedView(
+        name=pair.name,
+        left=small_jpeg(rectified.left, _MOST_PX),
+        right=small_jpeg(rectified.right, _MOST_PX),
+        size_px=(made.width_px, made.height_px),
+        left_px=corners[0],
+        right_px=corners[1],
+        is_vertical=made.epipolar.is_vertical,
+    )
+
+
+def _scaled(corners_px: Corners, own: CameraModel, small: CameraModel) -> Corners:
+    """Return corners in a smaller copy of their image; pixel centres are integers."""
+    scale = np.array([small.width_px / own.width_px, small.height_px / own.height_px])
+    return np.asarray((corners_px + 0.5) * scale - 0.5, np.float64)

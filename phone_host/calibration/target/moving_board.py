@@ -12,7 +12,7 @@ import numpy as np
 
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
-from phone_host.calibration.target.board_fits import ENOUGH, Fits, Inner
+from phone_host.calibration.target.board_fits import ENOUGH, Fits, Inner, side_by_side
 from phone_host.calibration.target.board_names import board_name
 from phone_host.calibration.target.board_size import (
     Vote,
@@ -24,7 +24,6 @@ from phone_host.calibration.target.board_size import (
 from phone_host.calibration.target.corners import Board, Corners, agree, find_corners, order_by_colour
 from phone_host.calibration.target.marks_seen import find_marks, require_marks
 from phone_host.calibration.target.small_picture import shrunk
-from phone_host.calibration.target.threads import side_by_side
 from phone_host.model import Image
 
 _SEARCHED_PX: Final = 480

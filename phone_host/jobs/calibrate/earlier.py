@@ -9,7 +9,7 @@ from common.imagesize.head import size_text
 from common.words import counted
 from phone_host.calibration.solve.calibrate import Sizes, calibrate, solve_pose
 from phone_host.calibration.solve.earlier_views import board_of, new_ones, pairs_of, together, views_of
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.board_names import board_name, named_board
 from phone_host.calibration.target.cameras_beside import first_sizes
 from phone_host.calibration.target.corners import Board

@@ -22,18 +22,16 @@ from phone_host.calibration.failure_modes.mistakes import Mistake
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.failure_modes.remedies import arrangement_hint, assessed
 from phone_host.calibration.guide.gates import View
-from phone_host.calibration.guide.progress import LEAST_STATED, Progress, lessons
-from phone_host.calibration.guide.snapshot import GuideSnapshot
-from phone_host.calibration.guide.unseen import unseen_in
-from phone_host.calibration.guide.wants import CORNERS, Want
+from phone_host.calibration.guide.snapshot import LEAST_STATED, GuideSnapshot, Progress, lessons
+from phone_host.calibration.guide.wants import CORNERS, Want, unseen_in
 from phone_host.calibration.solve.earlier_views import board_of, pairs_of
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.board_views import BoardViews, Size
 from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.sharpness import SeenLook
 from phone_host.camera.browser_feed import BrowserFeed
-from phone_host.camera.examples import EXAMPLE
 from phone_host.camera.factory import open_camera
+from phone_host.camera.uris import EXAMPLE
 from phone_host.discovery.opened import open_named
 from phone_host.jobs.calibrate.earlier import Asked, Series, calibrated, every_pair
 from phone_host.jobs.calibrate.live_calibration import LiveCalibration, LiveSettings

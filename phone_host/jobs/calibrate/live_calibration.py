@@ -18,10 +18,8 @@ from common.errors import SettingsError
 from common.link.base import Link
 from phone_host.calibration.guide.gates import Gate, Glance, View
 from phone_host.calibration.guide.guide import Guide
-from phone_host.calibration.guide.progress import Progress
-from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, before_board
-from phone_host.calibration.guide.wants import Want
-from phone_host.calibration.guide.words import Words
+from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot, Progress, before_board
+from phone_host.calibration.guide.wants import Want, Words
 from phone_host.calibration.target.board_views import Size
 from phone_host.calibration.target.corners import Board, Corners
 from phone_host.calibration.target.moving_board import BoardFinder, SizeCheck, SizeFinder
@@ -29,7 +27,7 @@ from phone_host.calibration.target.sharpness import look_at
 from phone_host.diagnostics.run_snapshot import unused
 from phone_host.jobs.calibrate.newest import Newest
 from phone_host.model import Image, Result
-from phone_host.recording.view_folders import Pictures, ViewFolders
+from phone_host.recording.chosen_views import Pictures, ViewFolders
 from phone_host.report.summary import camera_troubles
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings

@@ -9,12 +9,12 @@ from common.diagnostic import Diagnostic
 from common.errors import DataError
 from phone_host.calibration.failure_modes.mistakes import Course, unturned
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake, placed
-from phone_host.calibration.failure_modes.out_of_step import out_of_step
+from phone_host.calibration.failure_modes.partners import out_of_step
 from phone_host.calibration.failure_modes.remedies import arrangement_hint, assessed, out_of_step_error
-from phone_host.calibration.guide.unseen import guessed_corners, with_corners
+from phone_host.calibration.guide.wants import guessed_corners, with_corners
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.result import Calibration
 from phone_host.calibration.solve.series_snapshot import Taken
+from phone_host.calibration.solve.verdict import Calibration
 from phone_host.calibration.target.board_views import BoardViews, look_for_boards
 from phone_host.calibration.target.cameras_beside import cameras_beside, require_sizes, with_cameras
 from phone_host.calibration.target.pairs import BoardPair, Reason

@@ -12,8 +12,14 @@ from common import now
 from common.places import make_folder
 from common.program.terminal import say
 from phone_host.calibration.guide.gates import View
-from phone_host.calibration.guide.picture import figure_lines, guide_svg, picture_lines, verdict_lines
-from phone_host.calibration.guide.snapshot import Ended, GuideSnapshot
+from phone_host.calibration.guide.snapshot import (
+    Ended,
+    GuideSnapshot,
+    figure_lines,
+    guide_svg,
+    picture_lines,
+    verdict_lines,
+)
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
 from phone_host.run.redrawn import Part, Redrawn

@@ -9,8 +9,7 @@ import pytest
 from common.camera_identity import CameraIdentity
 from common.frame import FrameFault
 from phone_host.camera.browser_border import Believed, BrowserBorder, Disbelieved, Intervals
-from phone_host.camera.browser_clock import BrowserClock
-from phone_host.camera.browser_epoch import Epoch
+from phone_host.camera.browser_clock import BrowserClock, Epoch
 from phone_host.camera.browser_wire import EchoAsked, EchoHeard, Hello
 from phone_host.sync.clock import Heard
 from tests.support.scripted_browser import LUMA, Shot

@@ -11,7 +11,6 @@ from common.camera_identity import Lock
 from common.errors import SettingsError
 from common.frame import FrameFault, PixelFormat
 from phone_host.camera.browser_locks import groups_of, locks_of
-from phone_host.camera.browser_uri import BrowserSettings, Encoding, browser_settings
 from phone_host.camera.browser_wire import (
     HEAD_BYTES,
     MOST_TEXT,
@@ -34,6 +33,7 @@ from phone_host.camera.browser_wire import (
     welcome_text,
 )
 from phone_host.camera.factory import camera_orientation, check_camera, open_camera
+from phone_host.camera.uris import BrowserSettings, Encoding, browser_settings
 from tests.support.pictures import jpeg
 from tests.support.scripted_browser import LUMA, Shot
 

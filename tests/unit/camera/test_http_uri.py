@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import SettingsError
-from phone_host.camera.arrivals import Arrivals
-from phone_host.camera.http_uri import HttpSettings, http_settings, without_password
+from phone_host.camera.jpegs import Arrivals
+from phone_host.camera.uris import HttpSettings, http_settings, without_password
 
 MS = 1_000_000
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from phone_host.demo.scan_truth import model_errors
+from phone_host.demo.scan_demonstration import model_errors
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scene.scene_model import Body, Sphere

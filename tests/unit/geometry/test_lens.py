@@ -21,8 +21,9 @@ from phone_host.geometry.lens import (
 from phone_host.model import CameraModel, Lens, Side
 from phone_host.scene.cast import project as scene_project
 from phone_host.scene.cast import rays_through as rays_of_scene
-from phone_host.scene.scene import plane_scene, render, rig_poses
-from phone_host.scene.scene_model import Pose
+from phone_host.scene.scene import plane_scene
+from phone_host.scene.scene_model import Pose, rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.evidence_points import ThroughRig

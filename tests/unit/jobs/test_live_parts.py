@@ -30,7 +30,7 @@ from phone_host.jobs.calibrate.newest import Newest
 from phone_host.jobs.calibrate.view import Lines, Picture, SnapshotFiles, Spoken
 from phone_host.jobs.calibrate.voice import Voice, speech_program
 from phone_host.model import Image, Verdict
-from phone_host.recording.view_folders import Pictures, ViewFolders
+from phone_host.recording.chosen_views import Pictures, ViewFolders
 from phone_host.run.host_settings import HostSettings
 from phone_host.verbs.calibrate import exit_code, run
 from tests.support.boards import BOARD, poses, render_pair

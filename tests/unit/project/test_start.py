@@ -56,12 +56,12 @@ def test_help_loads_no_command() -> None:
         (
             "ipc://{folder}/link",
             "v4l2:{folder}/none",
-            {"common.camera.replay", "common.link.serial", "common.link.rfcomm_opener"},
+            {"common.camera.replay", "common.link.serial", "common.link.rfcomm"},
         ),
         (
             "serial:{folder}/none",
             "replay:{folder}",
-            {"common.camera.v4l2", "common.link.zeromq", "common.link.rfcomm_opener"},
+            {"common.camera.v4l2", "common.link.zeromq", "common.link.rfcomm"},
         ),
     ],
 )

@@ -18,8 +18,8 @@ from phone_host.calibration.target.cameras_beside import cameras_beside
 from phone_host.jobs.picture_pairs import given_pictures
 from phone_host.model import Side
 from phone_host.recording.chosen_views import MOST, NS, choose_views, stillest
-from phone_host.recording.copied import copy_recording
 from phone_host.recording.footage import read_recording
+from phone_host.recording.joining import copy_recording
 from phone_host.stereo.view_files import pair_files
 from tests.support.recorded import LATE_NS, PERIOD_NS, ZERO_NS, payload, recording, recording_file
 from tests.support.samples import CAMERA

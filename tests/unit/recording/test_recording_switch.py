@@ -14,7 +14,7 @@ from common.errors import SettingsError
 from common.recording.opened import open_recorded
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Side
-from phone_host.recording.begin import begin_recording
+from phone_host.recording.recorder import begin_recording
 from phone_host.recording.switch import RecordingSwitch
 from tests.support.programs import until
 from tests.support.recorded import board_frame, own_frame, payload

@@ -10,7 +10,9 @@ from common import now
 from phone_host.calibration.drift.see import Timed
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Processed, Result, Side
 from phone_host.run.drift_keeper import DriftKeeper, Moment, log_change
-from phone_host.scene.scene import demo_scene, render, rig_poses
+from phone_host.scene.scene import demo_scene
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.departure import corrected_rig
 from phone_host.stereo.evidence import look_at, maps_of

@@ -16,7 +16,9 @@ from phone_host.diagnostics.headline import Grade, answer
 from phone_host.model import Epipolar, Image, Processed, RectifiedPair, Result, Rig, StereoGeometry
 from phone_host.run.sinks import SinkQueue
 from phone_host.run.trust_sink import TrustSink
-from phone_host.scene.scene import demo_scene, render, rig_poses, unlike_rig
+from phone_host.scene.scene import demo_scene, unlike_rig
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from phone_host.model import Disparity, RectifiedPair
 from phone_host.scene.cast import pixel_rays
-from phone_host.scene.scene import Body, Plane, Scene, rectified_cameras, truth
+from phone_host.scene.scene import rectified_cameras, truth
+from phone_host.scene.scene_model import Body, Plane, Scene
 from tests.bench.depth_accuracy import Case, Row, by_three_way, score
 from tests.bench.depth_boards import View, view_scores
 from tests.bench.depth_choice import choices

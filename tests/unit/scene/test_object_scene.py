@@ -24,8 +24,7 @@ from phone_host.scene.object_scene import (
 )
 from phone_host.scene.scene_model import Body, Box, Frustum, Plane, Pose, Scene, Shape, Sphere, Texture, Torus, rotation
 from phone_host.scene.scene_render import render
-from phone_host.scene.solid import Solid
-from phone_host.scene.surface_samples import samples_of
+from phone_host.scene.solid import Solid, samples_of
 
 ROUND = (Frustum(0.03, 0.01, 0.05), Frustum(0.02, 0.02, 0.04), Frustum(0.03, 0.0, 0.06), Torus(0.03, 0.008))
 SHAPES = (*ROUND, Sphere(0.03), Box((0.05, 0.03, 0.004)))

@@ -13,11 +13,20 @@ from numpy.typing import NDArray
 
 from common.errors import UnavailableError
 from phone_host.model import RectifiedPair, StereoGeometry
+from phone_host.scene.cast import pixel_rays, project
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import (
     DEMO_PERIOD_S,
     PHONE_LOOK,
     WEBCAM_LOOK,
+    demo_scene,
+    matched_view,
+    plane_scene,
+    rectified_cameras,
+    truth,
+    unlike_rig,
+)
+from phone_host.scene.scene_model import (
     Body,
     Box,
     Look,
@@ -25,22 +34,13 @@ from phone_host.scene.scene import (
     Plane,
     Pose,
     RectifiedView,
-    Renderer,
     Scene,
     Sphere,
     Texture,
-    demo_scene,
-    matched_view,
-    pixel_rays,
-    plane_scene,
-    project,
-    rectified_cameras,
-    render,
     rig_poses,
     rotation,
-    truth,
-    unlike_rig,
 )
+from phone_host.scene.scene_render import Renderer, render
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import narrow_rig, small_rig

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from phone_host.scene.scene import Body, Box, Plane, Sphere
-from phone_host.scene.scene_model import Light
+from phone_host.scene.scene_model import Body, Box, Light, Plane, Sphere
 from phone_host.scene.shade import lamp_reaching, may_darken, shadow_balls, sky_blocked
 
 UP = (0.0, 1.0, 0.0)

@@ -9,9 +9,10 @@ from common.camera_identity import Lock
 from common.ledger import StageTimes
 from common.protocol.message import Lane, LockState, SetLocks
 from common.protocol.session import MS
-from phone_host.calibration.solve.bundle import BundleResult, FreeParameters
+from phone_host.calibration.solve.bundle import BundleResult, free_flags
 from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState
 from phone_host.calibration.solve.next_view import next_view
+from phone_host.geometry.schur import Flags
 from phone_host.model import Crop, CutCounts, Image, Processed, RectifiedPair, Search, StereoGeometry
 from phone_host.stereo.evidence_features import Matches
 from phone_host.stereo.evidence_search import beyond_search, measure_fit
@@ -124,7 +125,7 @@ def test_stripes_along_the_rows_are_alike_and_tell_no_disparity() -> None:
     assert strong.disparity_px == pytest.approx(20.0, abs=0.1)
 
 
-def _result(covariance: float, baseline_m: float = 0.1) -> tuple[BundleResult, FreeParameters]:
+def _result(covariance: float, baseline_m: float = 0.1) -> tuple[BundleResult, Flags]:
     """A fitted rig with this variance of each shared parameter."""
     rig = unlike_rig()
     state = BundleState(
@@ -135,7 +136,7 @@ def _result(covariance: float, baseline_m: float = 0.1) -> tuple[BundleResult, F
         poses=np.array([[0.0, 0, 0, -0.1, -0.1, 1.0]]),
     )
     errors = np.full((1, 4, 2), 0.1)
-    free = FreeParameters(np.ones(12, np.bool_), np.ones(12, np.bool_))
+    free = free_flags(np.ones(12, np.bool_), np.ones(12, np.bool_))
     result = BundleResult(
         state=state, left_errors_px=errors, right_errors_px=errors, covariance=np.eye(GLOBALS) * covariance
     )

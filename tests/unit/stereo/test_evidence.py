@@ -31,7 +31,9 @@ from phone_host.model import (
 )
 from phone_host.report import depth_data
 from phone_host.run.stereo_remarks import judge_pair
-from phone_host.scene.scene import Look, demo_scene, render, rig_poses
+from phone_host.scene.scene import demo_scene
+from phone_host.scene.scene_model import Look, rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.evidence import density, has_depth, maps_of, measure_evidence

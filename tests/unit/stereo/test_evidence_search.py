@@ -15,7 +15,9 @@ from phone_host.diagnostics.headline import Grade, answer
 from phone_host.diagnostics.image_rules import image_doubts, median_figures
 from phone_host.diagnostics.run_rules import no_depth
 from phone_host.model import CameraModel, Crop, Evidence, Image, Rig, StereoGeometry
-from phone_host.scene.scene import Look, demo_scene, render, rig_poses
+from phone_host.scene.scene import demo_scene
+from phone_host.scene.scene_model import Look, rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.evidence import maps_of, measure_evidence

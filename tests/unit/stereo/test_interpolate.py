@@ -8,18 +8,9 @@ import numpy as np
 import pytest
 
 from phone_host.model import Image, RectifiedPair
-from phone_host.scene.scene import (
-    Body,
-    Path,
-    Renderer,
-    Scene,
-    Truth,
-    demo_scene,
-    matched_rig,
-    matched_view,
-    rig_poses,
-    truth,
-)
+from phone_host.scene.scene import Truth, demo_scene, matched_rig, matched_view, truth
+from phone_host.scene.scene_model import Body, Path, Scene, rig_poses
+from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stereo.match import MatchSettings, create_matcher
 

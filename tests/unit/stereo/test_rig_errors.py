@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.geometry.lens import parameters_of, with_parameters
-from phone_host.geometry.rig_pixels import LEFT, RIG, RIGHT, pixel_derivatives, standard_errors
+from phone_host.geometry.lens import (
+    LEFT,
+    RIG,
+    RIGHT,
+    parameters_of,
+    pixel_derivatives,
+    standard_errors,
+    with_parameters,
+)
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import RIG_PARAMETERS, Epipolar, Rig
 from phone_host.stereo.measured_point import MeasuredPoint, distance_between, measured_point

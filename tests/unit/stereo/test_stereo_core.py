@@ -8,7 +8,9 @@ import pytest
 
 from common.errors import DataError, SettingsError
 from phone_host.model import Crop, CutCounts, Epipolar, Image, RectifiedPair, Rig, Search, StereoGeometry
-from phone_host.scene.scene import matched_rig, plane_scene, render, rig_poses
+from phone_host.scene.scene import matched_rig, plane_scene
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings, create_matcher

@@ -9,7 +9,9 @@ from common import now
 from phone_host.diagnostics.codes import Code
 from phone_host.model import Processed
 from phone_host.run.trust_sink import TrustSink
-from phone_host.scene.scene import demo_scene, render, rig_poses
+from phone_host.scene.scene import demo_scene
+from phone_host.scene.scene_model import rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier

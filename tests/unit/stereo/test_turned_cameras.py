@@ -16,7 +16,7 @@ from common.protocol.message import FrameMessage
 from phone_host.calibration.failure_modes.arrangement import composed
 from phone_host.calibration.time_offset.shots import Shot
 from phone_host.camera import factory as host_factory
-from phone_host.camera.http_uri import without_orientation
+from phone_host.camera.uris import without_orientation
 from phone_host.model import FramePair, Image, Side
 from phone_host.recording import footage
 from phone_host.run.pipeline import Pipeline

@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 _TOLD = """
 import os, sys
-from common.program.streams import mend_streams
+from common.program.commandline import mend_streams
 from common.program.terminal import columns, rows, say
 assert columns() == rows() == 0
 mend_streams()

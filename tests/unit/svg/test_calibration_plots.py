@@ -7,10 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from phone_host.calibration.solve.series_snapshot import series_views
-from phone_host.calibration.solve.view_turns import view_turns
+from phone_host.calibration.solve.series_snapshot import series_views, view_turns
+from phone_host.calibration.target.board_views import fullest, rectified_view
 from phone_host.calibration.target.pairs import Reason, Rejected
-from phone_host.calibration.target.rectified_view import fullest, rectified_view
 from phone_host.calibration.target.small_picture import small_jpeg, small_size
 from phone_host.report.calibration_space import Shape, in_space, seen_from
 from phone_host.svg.plot_arrows import enlarged

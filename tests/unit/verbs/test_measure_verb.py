@@ -14,7 +14,9 @@ from phone_host.cli import main
 from phone_host.model import RIG_PARAMETERS, Rig, Verdict
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.cast import cast, rays_through
-from phone_host.scene.scene import Look, plane_scene, render, rig_poses
+from phone_host.scene.scene import plane_scene
+from phone_host.scene.scene_model import Look, rig_poses
+from phone_host.scene.scene_render import render
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.overlays import write_turned
 from tests.support.rigs import small_rig

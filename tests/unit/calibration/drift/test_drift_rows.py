@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.drift.fit import fit_rows, proven
-from phone_host.calibration.drift.rows import PARAMETERS, Sighting, departure_of, values_of
+from phone_host.calibration.drift.fit import PARAMETERS, Sighting, departure_of, fit_rows, proven, values_of
 from phone_host.model import AS_CALIBRATED, Departure
 from tests.support.drift_sightings import sight
 

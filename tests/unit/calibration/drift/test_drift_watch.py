@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.drift.rows import RowModel, Sighting
+from phone_host.calibration.drift.fit import RowModel, Sighting
 from phone_host.calibration.drift.watch import DriftWatch, Trends
 from phone_host.diagnostics.codes import Code
 from phone_host.diagnostics.drift import drift_concerns

@@ -7,7 +7,7 @@ import pytest
 
 from phone_host.calibration.failure_modes.mistakes import Mistake
 from phone_host.calibration.failure_modes.name import bent
-from phone_host.calibration.solve.result import Calibration
+from phone_host.calibration.solve.verdict import Calibration
 from tests.support.boards import BOARD
 from tests.support.calibration_series import calibration
 

@@ -15,12 +15,10 @@ from phone_host.calibration.failure_modes.lone import both_alone
 from phone_host.calibration.failure_modes.mistakes import Course, Mistake
 from phone_host.calibration.failure_modes.name import BoardSeries, name_mistake
 from phone_host.calibration.failure_modes.partners import wrong_partners
-from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.board_plane import find_board_plane
-from phone_host.calibration.solve.board_pose import rough_pose
-from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem
+from phone_host.calibration.solve.board_pose import find_board_plane, rough_pose
+from phone_host.calibration.solve.bundle_problem import GLOBALS, Bend, BundleState, RigProblem
 from phone_host.calibration.solve.calibrate import solve_pose
-from phone_host.calibration.solve.result import Calibration, Squares
+from phone_host.calibration.solve.verdict import Calibration, Squares
 from phone_host.calibration.target.board_names import named_board
 from phone_host.calibration.target.corners import Board, find_corners
 from phone_host.calibration.target.marked import MarkFamily
@@ -282,9 +280,7 @@ def test_a_state_without_projections_costs_infinitely_much() -> None:
     """Of a board whose place is not a number no corner is seen anywhere; at the true place exact corners cost nothing."""
     rig, pose = unlike_rig(), poses(1, seed=4)
     (pair,) = exact_pairs(rig, pose)
-    problem = RigProblem(
-        [BundleView(pair.left_px, pair.right_px)], BOARD.points_m(), (np.zeros(GLOBALS), np.zeros(GLOBALS)), (0.1, 0.1)
-    )
+    problem = RigProblem([pair], BOARD.points_m(), (np.zeros(GLOBALS), np.zeros(GLOBALS)), (0.1, 0.1))
     turn = np.ravel(cv2.Rodrigues(rig.R_right_left)[0]).astype(np.float64)
     state = BundleState(left=rig.left, right=rig.right, rotation=turn, translation_m=rig.t_right_left_m, poses=pose)
     assert problem.cost(state) == pytest.approx(0, abs=1e-6)

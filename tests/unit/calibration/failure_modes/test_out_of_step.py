@@ -3,7 +3,7 @@
 import pytest
 
 from common.errors import DataError
-from phone_host.calibration.failure_modes.out_of_step import out_of_step
+from phone_host.calibration.failure_modes.partners import out_of_step
 from phone_host.calibration.failure_modes.remedies import out_of_step_error
 from phone_host.calibration.target.pairs import FileCorners
 from phone_host.model import Side

@@ -12,17 +12,20 @@ from numpy.typing import NDArray
 
 from phone_host.calibration.guide.gates import Gate, Glance, View, is_alike
 from phone_host.calibration.guide.guide import Guide
-from phone_host.calibration.guide.picture import figure_lines, guide_svg, picture_lines
-from phone_host.calibration.guide.progress import Progress, Taught, lessons
-from phone_host.calibration.guide.snapshot import Ended, before_board
-from phone_host.calibration.guide.unseen import is_guessed, unseen_in, with_corners
-from phone_host.calibration.guide.wants import CORNERS, ORDER, Want
-from phone_host.calibration.guide.words import Speech, Words
-from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.guide.snapshot import (
+    Ended,
+    Progress,
+    before_board,
+    figure_lines,
+    guide_svg,
+    lessons,
+    picture_lines,
+)
+from phone_host.calibration.guide.wants import CORNERS, ORDER, Speech, Want, Words, is_guessed, unseen_in, with_corners
+from phone_host.calibration.solve.bundle_problem import Bend
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.next_view import Spot, after_one_m, depth_sigma_m
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment
+from phone_host.calibration.solve.verdict import Assessment, Calibration
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.calibration.target.sharpness import BoardLook
 from phone_host.model import Side, Verdict
@@ -36,10 +39,10 @@ LOOK_NS = SECOND_NS // 10
 SHARP = BoardLook(2.0, 0.0, 0.0)
 
 
-def grown(views: tuple[View, ...], verdict: Verdict, *taught: Taught, hopeless: bool = False) -> Progress:
+def grown(views: tuple[View, ...], verdict: Verdict, *taught: tuple[Want, float], hopeless: bool = False) -> Progress:
     """A calibration whose figures nobody asks for."""
     return Progress(
-        views=len(views), calibration=None, verdict=verdict, remedy="more", is_hopeless=hopeless, taught=taught
+        views=len(views), calibration=None, verdict=verdict, remedy="more", is_hopeless=hopeless, taught=dict(taught)
     )
 
 
@@ -131,7 +134,7 @@ def test_it_ends_when_the_verdict_is_good_and_no_wanted_view_helps(
         show.show(view)
     assert len(show.guide.views) == views
     calibration = replace(_calibration(), depths=((0.3, 0.0), (0.5, 0.0), (1.0, 0.004), (2.0, 0.0)))
-    progress = grown(tuple(show.guide.views), Verdict.GOOD, *(Taught(want, after_m) for want in ORDER))
+    progress = grown(tuple(show.guide.views), Verdict.GOOD, *((want, after_m) for want in ORDER))
     begun = show.guide.views[0].glance.at_ns
     now_ns = begun + 80 * SECOND_NS if not late_s else begun + round(late_s * SECOND_NS)
     show.guide.grow(replace(progress, calibration=calibration), now_ns)
@@ -293,7 +296,7 @@ def test_a_view_like_one_taken_is_not_taken_again() -> None:
             show.show(corners(x, y))
     assert show.show(tilted(25, 0)) is Gate.TAKEN
     guide = show.guide
-    guide.grow(grown((), Verdict.USABLE, Taught(Want.LEFT_AWAY, 0.001)), show.now_ns)
+    guide.grow(grown((), Verdict.USABLE, (Want.LEFT_AWAY, 0.001)), show.now_ns)
     for want in ORDER:  # all others are given up, one after the other
         if guide.snapshot(show.now_ns).asked is Want.LEFT_AWAY:
             break
@@ -319,11 +322,11 @@ def test_it_asks_for_what_helps_most() -> None:
     """Of the views that are still wanted, the one that would lower the depth error most; one that cannot be seen comes last."""
     show = Show()
     show.show(corners())
-    taught = (Taught(Want.FAR, 0.003), Taught(Want.NEAR, 0.002), Taught(Want.TOP_LEFT, math.nan))
+    taught = ((Want.FAR, 0.003), (Want.NEAR, 0.002), (Want.TOP_LEFT, math.nan))
     show.guide.grow(grown((), Verdict.USABLE, *taught), show.now_ns)
     assert show.guide.snapshot(show.now_ns).asked is Want.NEAR
     show.now_ns += 5 * SECOND_NS
-    show.guide.grow(grown((), Verdict.USABLE, Taught(Want.FAR, 0.001)), show.now_ns)
+    show.guide.grow(grown((), Verdict.USABLE, (Want.FAR, 0.001)), show.now_ns)
     assert show.guide.snapshot(show.now_ns).asked is Want.NEAR, "a person on the way is not sent elsewhere"
 
 
@@ -331,14 +334,14 @@ def test_a_person_who_moves_fast_is_stopped_in_time() -> None:
     """Half a second before the wanted view is there, while it moves that way, it is said to hold still."""
     show = Show()
     show.show(corners())
-    show.guide.grow(grown((), Verdict.USABLE, Taught(Want.TOP_LEFT, 0.001)), show.now_ns)
+    show.guide.grow(grown((), Verdict.USABLE, (Want.TOP_LEFT, 0.001)), show.now_ns)
     gates = [show.show(corners(0.5 - 0.02 * step, 0.5 - 0.02 * step), 0.1) for step in range(1, 6)]
     placed = show.guide.snapshot(show.now_ns)
     assert placed.asked is Want.TOP_LEFT
     assert gates[-1] is Gate.MOVING
     still = Show()
     still.show(corners())
-    still.guide.grow(grown((), Verdict.USABLE, Taught(Want.TOP_LEFT, 0.001)), still.now_ns)
+    still.guide.grow(grown((), Verdict.USABLE, (Want.TOP_LEFT, 0.001)), still.now_ns)
     assert still.show(corners(0.4, 0.4), 1.0) is Gate.NOTHING_NEW
 
 
@@ -351,9 +354,7 @@ def test_pictures_show_what_the_snapshot_says() -> None:
     ET.fromstring(guide_svg(nothing))
     show.show(corners())
     calibration = _calibration()
-    progress = replace(
-        grown(tuple(show.guide.views), Verdict.USABLE, Taught(Want.NEAR, 0.0021)), calibration=calibration
-    )
+    progress = replace(grown(tuple(show.guide.views), Verdict.USABLE, (Want.NEAR, 0.0021)), calibration=calibration)
     show.guide.grow(progress, show.now_ns)
     show.show(corners(0.6), 0.3)
     snapshot = show.guide.snapshot(show.now_ns)
@@ -381,13 +382,13 @@ def test_what_a_view_would_teach_is_what_it_teaches() -> None:
     assert rectification is not None
     now_m = depth_sigma_m(rig, rectification, 1.0)
     taught = lessons(calibration, BOARD)
-    assert [each.want for each in taught] == list(ORDER)
-    assert all(0 < each.after_m < now_m for each in taught if math.isfinite(each.after_m))
-    assert sum(math.isfinite(each.after_m) for each in taught) >= 8
+    assert list(taught) == list(ORDER)
+    assert all(0 < after_m < now_m for after_m in taught.values() if math.isfinite(after_m))
+    assert sum(map(math.isfinite, taught.values())) >= 8
     unknown = replace(rig, covariance=np.full((30, 30), math.nan))
     assert math.isnan(after_one_m(unknown, rectification, BOARD.points_m(), Spot()))
     assert math.isnan(after_one_m(rig, rectification, BOARD.points_m(), Spot(aside=(3.0, 0.0))))
-    assert lessons(replace(calibration, rectification=None), BOARD) == ()
+    assert lessons(replace(calibration, rectification=None), BOARD) == {}
 
 
 def test_progress_without_a_calibration_has_no_figures() -> None:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from common.errors import DataError
-from phone_host.calibration.solve.board_plane import board_plane_of, corners_bias_share, find_board_plane
+from phone_host.calibration.solve.board_pose import board_plane_of, corners_bias_share, find_board_plane
 from phone_host.calibration.target.corners import Board
 from phone_host.model import Epipolar, RectifiedPair, StereoGeometry
 from phone_host.stereo.plane_fit import normal_over_distance, plane_in_disparity

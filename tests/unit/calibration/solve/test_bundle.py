@@ -5,22 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import FreeParameters, adjust
-from phone_host.calibration.solve.bundle_problem import BundleState, BundleView
+from phone_host.calibration.solve.bundle import adjust, free_flags
+from phone_host.calibration.solve.bundle_problem import Bend, BundleState
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.target.pairs import BoardPair
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 
-FREE = FreeParameters(Bend.USUAL.free(), Bend.USUAL.free())
+FREE = free_flags(Bend.USUAL.free(), Bend.USUAL.free())
 """All but the third radial term."""
 
 
 def test_an_answer_that_cannot_be_bettered_is_kept() -> None:
     """Restarted from its own answer again and again, the search finds no better one and gives up: the rig of exact corners stays the true one."""
     rig, boards = unlike_rig(), poses(6, seed=2)
-    views = [BundleView(pair.left_px, pair.right_px) for pair in exact_pairs(rig, boards)]
+    views = exact_pairs(rig, boards)
     state = BundleState(
         left=rig.left,
         right=rig.right,
@@ -38,7 +37,7 @@ def test_an_answer_that_cannot_be_bettered_is_kept() -> None:
 def test_the_rig_is_found_from_a_rough_start() -> None:
     """From a focal length 2 % off, the corners are met to their noise, 0.2 px in each coordinate; a second search from that answer moves by less than a micrometre."""
     rig, boards = unlike_rig(), poses(6, seed=2)
-    views = [BundleView(pair.left_px, pair.right_px) for pair in exact_pairs(rig, boards, noise_px=0.2, seed=3)]
+    views = exact_pairs(rig, boards, noise_px=0.2, seed=3)
     rough = BundleState(
         left=replace(rig.left, matrix=rig.left.matrix * np.array([[1.02, 1, 1], [1, 1.02, 1], [1, 1, 1]])),
         right=rig.right,
@@ -66,7 +65,7 @@ def test_corners_that_are_not_seen_are_left_out() -> None:
     state = BundleState(
         left=rig.left, right=rig.right, rotation=np.array([0.021, -0.05, 0.03]), translation_m=rig.t_right_left_m, poses=boards
     )  # fmt: skip
-    found = adjust([BundleView(pair.left_px, pair.right_px) for pair in pairs], BOARD.points_m(), state, FREE)
+    found = adjust(pairs, BOARD.points_m(), state, FREE)
     np.testing.assert_allclose(found.state.translation_m, rig.t_right_left_m, atol=1e-6)
     assert np.isnan(found.left_errors_px).sum() == 9 * 18 * 2
     whole = calibrate(pairs, BOARD, ((640, 480), (1280, 720)))

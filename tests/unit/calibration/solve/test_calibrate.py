@@ -12,11 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.bundle_problem import Bend
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.calibrate_alone import off_words
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import Assessment, judge, size_factor, vertical_p95_px
+from phone_host.calibration.solve.verdict import Assessment, Calibration, judge, size_factor, vertical_p95_px
 from phone_host.calibration.target.pairs import BoardPair, Reason, Rejected
 from phone_host.model import CameraModel, Rig, Verdict
 from tests.support.boards import BOARD, exact_pairs, poses

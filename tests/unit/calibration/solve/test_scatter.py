@@ -4,22 +4,22 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import BundleResult, FreeParameters, adjust, deviation_px, noise_of
-from phone_host.calibration.solve.bundle_problem import GLOBALS, BundleState, BundleView, RigProblem
+from phone_host.calibration.solve.bundle import BundleResult, adjust, deviation_px, free_flags, noise_of
+from phone_host.calibration.solve.bundle_problem import GLOBALS, Bend, BundleState, RigProblem
+from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.se3 import vectors_of
 from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import unlike_rig
 
-_FREE = FreeParameters(Bend.USUAL.free(), Bend.USUAL.free())
+_FREE = free_flags(Bend.USUAL.free(), Bend.USUAL.free())
 _NOISE_PX, _SHIFT_PX, _VIEWS, _SERIES = 0.011, 0.02, 10, 12
 """Live views of rendered rigs: so well are corners found, so far does a hand move between the two exposures."""
 
 
-def _views(shift_px: float, seed: int, count: int = _VIEWS) -> tuple[list[BundleView], NDArray[np.float64]]:
+def _views(shift_px: float, seed: int, count: int = _VIEWS) -> tuple[list[BoardPair], NDArray[np.float64]]:
     boards, random = poses(count, seed), np.random.default_rng(100 + seed)
     pairs = exact_pairs(unlike_rig(), boards, _NOISE_PX, seed)
-    views = [BundleView(pair.left_px, pair.right_px + random.normal(0, shift_px, 2)) for pair in pairs]
+    views = [BoardPair(pair.name, pair.left_px, pair.right_px + random.normal(0, shift_px, 2)) for pair in pairs]
     return views, boards
 
 
@@ -29,7 +29,7 @@ def _true_state(boards: NDArray[np.float64]) -> BundleState:
     return BundleState(left=rig.left, right=rig.right, rotation=turn, translation_m=rig.t_right_left_m, poses=boards)
 
 
-def _found(views: list[BundleView], boards: NDArray[np.float64]) -> BundleResult:
+def _found(views: list[BoardPair], boards: NDArray[np.float64]) -> BundleResult:
     return adjust(views, BOARD.points_m(), _true_state(boards), _FREE)
 
 
@@ -62,12 +62,12 @@ def test_noise_and_shift_are_told_apart() -> None:
 def test_views_of_one_side_tell_no_shift() -> None:
     """Three views, one of which the right camera did not see: two are too few to tell a shift, and corners that nobody saw count for nothing."""
     views, boards = _views(0.5, seed=1, count=3)
-    views[1] = BundleView(views[1].left_px, np.full_like(views[1].right_px, np.nan))
+    views[1] = BoardPair("", views[1].left_px, np.full_like(views[1].right_px, np.nan))
     problem = _problem(views)
     assert noise_of(problem, _true_state(boards), 0)[1] == 0.0
     assert deviation_px(np.full(3, np.nan)) == 1.0
 
 
-def _problem(views: list[BundleView]) -> RigProblem:
+def _problem(views: list[BoardPair]) -> RigProblem:
     nothing = np.zeros(GLOBALS)
     return RigProblem(views, BOARD.points_m(), (nothing, nothing), (0.02, 0.02))

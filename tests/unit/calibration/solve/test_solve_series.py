@@ -13,10 +13,9 @@ from common.errors import DataError
 from common.orientation import Flip, Orientation
 from phone_host.calibration.failure_modes.arrangement import turned_corners
 from phone_host.calibration.failure_modes.mistakes import Course, Mistake
-from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.bundle_problem import Bend
 from phone_host.calibration.solve.calibrate import calibrate
-from phone_host.calibration.solve.result import Calibration
-from phone_host.calibration.solve.verdict import judge
+from phone_host.calibration.solve.verdict import Calibration, judge
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.geometry.se3 import vectors_of

@@ -1,6 +1,6 @@
 """Two wide fisheyes: views off the axis are what tells the lens, and none of them is rejected."""
 
-from phone_host.calibration.solve.bend import Bend
+from phone_host.calibration.solve.bundle_problem import Bend
 from phone_host.calibration.solve.calibrate import fit_rig
 from tests.support.fisheyes import BOARD, fisheye, fisheye_pairs
 

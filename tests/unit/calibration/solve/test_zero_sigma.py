@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from phone_host.calibration.solve.bend import Bend
-from phone_host.calibration.solve.bundle import FreeParameters, adjust, rig_of
-from phone_host.calibration.solve.bundle_problem import BundleState, BundleView
+from phone_host.calibration.solve.bundle import adjust, free_flags, rig_of
+from phone_host.calibration.solve.bundle_problem import Bend, BundleState
 from phone_host.calibration.solve.calibrate import calibrate
 from phone_host.calibration.solve.next_view import depth_sigma_m, zero_sigma_px
 from phone_host.model import Rectification, Rig
@@ -18,7 +17,7 @@ from tests.support.boards import BOARD, exact_pairs, poses
 from tests.support.rigs import project_points, unlike_rig
 
 _SIZES = ((640, 480), (1280, 720))
-_FREE = FreeParameters(Bend.USUAL.free(), Bend.USUAL.free())
+_FREE = free_flags(Bend.USUAL.free(), Bend.USUAL.free())
 _STARS_M = 1e9
 """So far that 0.1 m of baseline moves nothing by a millionth of a pixel."""
 
@@ -51,7 +50,7 @@ def test_the_stated_sigmas_are_those_of_many_calibrations() -> None:
     for seed in range(30):
         board_poses = poses(10, seed)
         pairs = exact_pairs(truth, board_poses, noise_px=0.2, seed=seed)
-        views = [BundleView(pair.left_px, pair.right_px) for pair in pairs]
+        views = pairs
         result = adjust(views, BOARD.points_m(), _state(truth, board_poses), _FREE)
         rig = replace(rig_of(result.state), covariance=result.covariance)
         rectification = rectify_rig(rig)

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from common.errors import DataError, SettingsError
-from phone_host.calibration.target.board_fits import Fits
+from phone_host.calibration.target.board_fits import Fits, side_by_side
 from phone_host.calibration.target.board_size import Vote, inner_lattice, require_size, size_in_files, size_seen
 from phone_host.calibration.target.corners import Board
-from phone_host.calibration.target.threads import side_by_side
 from phone_host.stereo.view_files import ViewFiles, pair_files
 from tests.support.boards import poses, render_pair
 from tests.support.numbered import draw

@@ -24,15 +24,9 @@ from phone_host.calibration.time_offset.screen import (
 from phone_host.calibration.time_offset.shared_motion import measure_shared_motion
 from phone_host.calibration.time_offset.shots import Measured, Method, Shot, Times
 from phone_host.model import Image, Side
-from phone_host.scene.scene import (
-    PHONE_LOOK,
-    WEBCAM_LOOK,
-    Path,
-    Renderer,
-    Scene,
-    demo_scene,
-    rig_poses,
-)
+from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, demo_scene
+from phone_host.scene.scene_model import Path, Scene, rig_poses
+from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.stereo.rectifier import Rectifier
 from tests.support.rigs import small_rig

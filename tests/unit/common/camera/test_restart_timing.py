@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from common.camera.restart_timing import RestartTiming, typical_phase
+from common.camera.v4l2_stamps import RestartTiming, typical_phase
 
 MS = 1_000_000
 LATENCY_NS = 130 * MS

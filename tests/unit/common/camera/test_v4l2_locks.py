@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from common.camera import v4l2_abi as abi
 from common.camera.v4l2_controls import Axis, Control, ControlWishes, to_axis, to_locks
-from common.camera.v4l2_device import Device
+from common.camera.v4l2_device import Device, serial_number
 from common.camera.v4l2_open_controls import OpenControls
-from common.camera.v4l2_serial import serial_number
-from common.camera.v4l2_tally import Tally
+from common.camera.v4l2_stamps import Tally
 from common.camera_identity import Lock
 from tests.support.samples import control
 

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.camera.v4l2_device import PixelFormatSet
-from common.camera.v4l2_pack import Packing, SendPart
+from common.camera.v4l2_formats import Packing, PixelFormatSet, SendPart
 from common.frame import FrameFault, PixelFormat, find_fault, raw_bytes
 
 _LETTERS = {PixelFormat.YUYV: "YUYV", PixelFormat.GREY: "GREY", PixelFormat.NV12: "NV12"}

@@ -6,8 +6,7 @@ import pytest
 
 from common.camera.factory import open_camera
 from common.camera.v4l2_controls import Axis, ControlWishes, PowerLine
-from common.camera.v4l2_formats import Wanted
-from common.camera.v4l2_pack import SendPart
+from common.camera.v4l2_formats import SendPart, Wanted
 from common.camera.v4l2_stream import V4l2Settings
 from common.camera.v4l2_uri import v4l2_settings
 from common.errors import SettingsError, UnavailableError

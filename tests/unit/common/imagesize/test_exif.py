@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from common.errors import DataError
 from common.frame import PixelFormat, SpoiledImageError
-from common.imagesize.exif import exif_orientation
 from common.imagesize.read import read_head
+from common.imagesize.tiff import exif_orientation
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.model import Image
 from phone_host.stereo.images import decode, open_image, read_image

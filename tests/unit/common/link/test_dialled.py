@@ -7,9 +7,9 @@ import zmq
 
 from common.errors import UnavailableError
 from common.link.base import Broken
-from common.link.dialled import Dialled
 from common.link.waiter import Waiter
 from common.link.zeromq import ZeroMqDialer
+from common.link.zeromq_socket import Dialled
 from tests.support.keys import acquainted
 from tests.support.programs import until
 

@@ -21,8 +21,8 @@ from common.doctor.unit_check import Unit
 from common.errors import SettingsError, TakenError, UnavailableError
 from common.link.base import Incoming, Link
 from common.link.factory import open_link, parse_link
-from common.link.ipc_folder import runtime_folder
 from common.link.waiter import Waiter
+from phone_host.subprocesses.board_process import runtime_folder
 from tests.support.nobody import NOBODY, nobody
 
 PATIENCE_S = 30.0

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from common.errors import SettingsError
-from common.program.declaration import setting
+from common.program.request import setting
 from common.program.settings import listing, log_level, resolve, with_origins
 
 

@@ -10,9 +10,8 @@ from board_agent.ring import PARTS, BoundedFiles, part_path, parts_of
 from common.errors import SettingsError, UnavailableError
 from common.frame import Frame, PixelFormat
 from common.program.quantities import file_size
-from common.recording.capture_runs import CaptureRuns
 from common.recording.disk_queue import WriteEnd
-from common.recording.layout import ABOUT, About
+from common.recording.layout import ABOUT, About, CaptureRuns
 from common.recording.opened import open_recorded
 from common.recording.recording_file import RecordingFile
 from tests.support.pictures import jpeg

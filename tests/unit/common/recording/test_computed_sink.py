@@ -16,7 +16,7 @@ from common.recording.ros_messages import IMAGE, POINT_BYTES, POINT_CLOUD
 from common.recording.salvage import Salvage
 from phone_host.jobs.run_request import checked
 from phone_host.model import FramePair, Processed, RectifiedPair, Result, Side
-from phone_host.recording.begin import begin_recording
+from phone_host.recording.recorder import begin_recording
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.run.recording_sinks import Computed, ComputedSink, cloud_data
 from tests.support.programs import until

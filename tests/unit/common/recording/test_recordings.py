@@ -15,13 +15,12 @@ from common.protocol.message import Pacing
 from common.recording.layout import camera_of, camera_values
 from common.recording.mcap_records import Message
 from common.recording.mcap_writer import McapWriter, Topic
-from common.recording.numbering import pairs_of_two
 from common.recording.opened import open_recorded
 from common.recording.ros_messages import RecordedImage, image_message
-from phone_host.recording.copied import copy_recording
-from phone_host.recording.folders import export_folders, import_folders
-from phone_host.recording.opened import open_playback
-from phone_host.recording.other_topics import ImportOptions, import_topics
+from common.recording.stamps import pairs_of_two
+from phone_host.recording.imports import ImportOptions, export_folders, import_folders, import_topics
+from phone_host.recording.joining import copy_recording
+from phone_host.recording.playback import open_playback
 from phone_host.recording.session_info import session_info
 from phone_host.recording.timed_images import TimeOptions
 from tests.support.recorded import LATE_NS, PERIOD_NS, ZERO_NS, payload, recording_file

@@ -6,13 +6,16 @@ come at a rate that a camera can have. Where several are left, nobody guesses.
 
 import math
 import statistics
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from enum import Enum
 from itertools import pairwise
 from typing import Final
 
 from common.errors import DataError
+from common.recording.mcap_records import Damage
 from common.recording.stamps import MAX_HZ, MIN_HZ, NS, stamp_fault
 
 EPOCH_NS: Final = 946_684_800 * NS
@@ -119,12 +122,44 @@ def usual_step(numbers: Sequence[Decimal]) -> Decimal:
     return statistics.median_low([after - before for before, after in pairwise(numbers)] or [Decimal(0)])
 
 
-def at_rate(places: Iterable[int], fps: float, zero_ns: int) -> list[int]:
-    """Return the times of images that came at a rate.
+def at_rate(places: Iterable[int], fps: float) -> list[int]:
+    """Return the times of images that came at a rate, ns; that of place 0 is EPOCH_NS.
 
     Args:
         places: of the images in their order, from 0.
         fps: images per second.
-        zero_ns: time of the place 0, ns.
     """
-    return [zero_ns + math.floor(place * NS / fps + 0.5) for place in places]
+    return [EPOCH_NS + math.floor(place * NS / fps + 0.5) for place in places]
+
+
+@dataclass(frozen=True, slots=True)
+class ImportAccount:
+    """What was imported.
+
+    Attributes:
+        images: how many images each side has.
+        remarks: what was used instead of times that cannot be true, in words.
+        unused: why a topic is not used, by topic.
+        damages: where something is missing in the source.
+    """
+
+    images: Mapping[str, int]
+    remarks: tuple[str, ...] = ()
+    unused: Mapping[str, str] = field(default_factory=dict)
+    damages: tuple[Damage, ...] = ()
+
+
+Size = tuple[int, int]
+
+
+def usual_size(sizes_px: Sequence[Size | None]) -> Size | None:
+    """Return the size that most images have, the first of those that are equally frequent.
+
+    Args:
+        sizes_px: width and height of each image, px; None: not known.
+
+    Returns:
+        The size; None: no size is known.
+    """
+    counts = Counter(size for size in sizes_px if size is not None)
+    return max(counts, key=counts.__getitem__, default=None)
