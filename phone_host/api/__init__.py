@@ -25,21 +25,18 @@ from phone_host.api.scans import save_scan, write_model
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.geometry.se3 import SE3
 from phone_host.geometry.triangulate import Intersections, triangulate
-from phone_host.model import Disparity, Image, RectifiedPair, Result, StereoGeometry
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import Disparity, Image, RectifiedPair, Result, StereoGeometry, UnseenSurface
 from phone_host.output.meshes.printable import Printer, Problem
 from phone_host.output.ply import write_ply
 from phone_host.output.rig_files.imported import Imported, import_rig
 from phone_host.printers.bed import Bed
-from phone_host.printers.door import Wishes
-from phone_host.printers.progress import Ended, Phase, Progress
+from phone_host.printers.door import Ended, Phase, Progress, Wishes
 from phone_host.run.model_job import check_model, export_model, print_model
-from phone_host.run.scan_files import read_field
-from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
+from phone_host.run.scan_job import read_field
+from phone_host.scan.blocks import Box
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.mat import Mat, parse_mat
-from phone_host.scan.scan import Scan
+from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair

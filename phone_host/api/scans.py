@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.output.ply import PointCloud, write_surface
-from phone_host.run.scan_files import write_scan
+from phone_host.run.scan_job import finished_scan, write_scan
 from phone_host.run.scan_result import own_axes, require_something
-from phone_host.run.scan_work import finished_scan
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 

@@ -23,7 +23,7 @@ from phone_host.output.axes import Axes
 from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.live_scan import LiveScan
-from phone_host.run.scan_files import FinishedScan
+from phone_host.run.scan_job import FinishedScan
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.scan_model import ScanModel

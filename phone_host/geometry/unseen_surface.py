@@ -8,7 +8,7 @@ from typing import Final, assert_never
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 
 Flags = NDArray[np.bool_]
 Colours = NDArray[np.uint8]

@@ -18,7 +18,7 @@ from phone_host.recording.playback import Playback
 from phone_host.run.pair_budget import usable_matchers
 from phone_host.run.recording_sinks import Computed
 from phone_host.settings import check, matcher_is_given, resolve_settings
-from phone_host.stereo.budget_ladder import BudgetWanted
+from phone_host.stereo.budget import BudgetWanted
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.matcher_names import matcher_named
 

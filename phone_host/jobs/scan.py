@@ -32,7 +32,7 @@ from phone_host.run.host import Host
 from phone_host.run.host_settings import EndReason
 from phone_host.run.kept import partial_words
 from phone_host.run.live_scan import LiveScan
-from phone_host.run.scan_files import NAMES, FinishedScan, write_scan
+from phone_host.run.scan_job import NAMES, FinishedScan, write_scan
 from phone_host.run.sinks import Sink
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import Submap

@@ -15,12 +15,12 @@ from phone_host.jobs.depth import LimitedDepthOptions
 from phone_host.jobs.options import PAIRED, ImageOptions, PairOptions
 from phone_host.jobs.units import length_mm
 from phone_host.model import Side
-from phone_host.model.unseen import UNSEEN_HELP, UnseenSurface
+from phone_host.model.quality import UNSEEN_HELP, UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.run.kept_submaps import read_submaps, require_no_submaps
-from phone_host.run.scan_files import read_field
+from phone_host.run.scan_job import read_field
 from phone_host.run.scan_result import own_axes
-from phone_host.scan.box import Box
+from phone_host.scan.blocks import Box
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.mat import USUAL_MAT, Mat, parse_mat
 from phone_host.scan.scan_wanted import ScanWanted

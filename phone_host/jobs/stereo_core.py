@@ -13,10 +13,9 @@ from phone_host.output.calib_txt import KittiCameras, is_calib_txt, read_calib_t
 from phone_host.output.overlay_yaml import read_overlay
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.depth_limits import DepthWanted
+from phone_host.stereo.depth_limits import DepthWanted, require_plausible, require_plausible_file
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import AnyMatcher, matcher_named
-from phone_host.stereo.plausible import require_plausible, require_plausible_file
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.scaled_rig import scaled_geometry
 

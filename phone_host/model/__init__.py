@@ -4,42 +4,37 @@ Conventions: camera axes x right, y down, z forward; pixel centres are integers 
     measurement.
 """
 
-from phone_host.model.budget import BudgetAccount, BudgetChange, BudgetReason, BudgetStep
-from phone_host.model.drift import (
+from phone_host.model.evidence import (
     AS_CALIBRATED,
+    Arrangement,
     Change,
     ChangeKind,
     Departure,
     Drift,
     DriftState,
-    Trend,
-    Turn,
-)
-from phone_host.model.evidence import (
-    Arrangement,
     Evidence,
     Exposure,
     OffMiddle,
     Support,
+    Trend,
+    Turn,
 )
 from phone_host.model.images import (
     CloudImage,
+    Confidence,
     Crop,
     CutCounts,
     DepthLimits,
     Disparity,
     Epipolar,
     Image,
+    Matched,
+    MatchReport,
     RectifiedPair,
     Search,
     StereoGeometry,
 )
-from phone_host.model.matching import (
-    Confidence,
-    Matched,
-    MatchReport,
-)
-from phone_host.model.quality import DisparityPlane, PlaneQuality, Seen, Tiles
+from phone_host.model.quality import DisparityPlane, PlaneQuality, Seen, Tiles, UnseenSurface
 from phone_host.model.rig import (
     RIG_PARAMETERS,
     UNMEASURED_NS,
@@ -53,6 +48,10 @@ from phone_host.model.rig import (
 )
 from phone_host.model.run import (
     BoardFrame,
+    BudgetAccount,
+    BudgetChange,
+    BudgetReason,
+    BudgetStep,
     DepthAccount,
     FramePair,
     PairCounts,
@@ -60,56 +59,3 @@ from phone_host.model.run import (
     Result,
     Unwritten,
 )
-
-__all__ = [
-    "AS_CALIBRATED",
-    "RIG_PARAMETERS",
-    "UNMEASURED_NS",
-    "Arrangement",
-    "BoardFrame",
-    "BudgetAccount",
-    "BudgetChange",
-    "BudgetReason",
-    "BudgetStep",
-    "CameraModel",
-    "Change",
-    "ChangeKind",
-    "CloudImage",
-    "Confidence",
-    "Crop",
-    "CutCounts",
-    "Departure",
-    "DepthAccount",
-    "DepthLimits",
-    "Disparity",
-    "DisparityPlane",
-    "Drift",
-    "DriftState",
-    "Epipolar",
-    "Evidence",
-    "Exposure",
-    "FramePair",
-    "Image",
-    "Lens",
-    "MatchReport",
-    "Matched",
-    "OffMiddle",
-    "PairCounts",
-    "PlaneQuality",
-    "Processed",
-    "Rectification",
-    "RectifiedPair",
-    "Result",
-    "Rig",
-    "Search",
-    "Seen",
-    "Side",
-    "StereoGeometry",
-    "Support",
-    "Tiles",
-    "TimeOffset",
-    "Trend",
-    "Turn",
-    "Unwritten",
-    "Verdict",
-]

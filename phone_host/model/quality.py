@@ -1,12 +1,30 @@
-"""What is measured on a flat wall or board that the cameras look at. No behaviour, no I/O."""
+"""What is measured on a flat wall or board that the cameras look at; what becomes of surface that no view measured. No behaviour, no I/O."""
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model.images import Crop
+
+UNSEEN_HELP: Final = "surface that no view measured: fill it in with colours from its border, fill it in pink, or cut it, which leaves the surface open"
+
+
+class UnseenSurface(Enum):
+    """The values of `--unseen`.
+
+    Attributes:
+        FILL: it is there, with colours from the border of the surface that was measured.
+        PINK: it is there, in pink.
+        CUT: it is not there; the surface is open.
+    """
+
+    FILL = "fill"
+    PINK = "pink"
+    CUT = "cut"
+
 
 Values = NDArray[np.float64]
 
@@ -87,7 +105,6 @@ class PlaneQuality:
         tilt_deg: angle between the plane's normal and the rectified optical axis, degrees.
         bias_m: `distance_m` minus the true distance, m; NaN: none is known.
         true_m: the true distance, m; NaN: none is known.
-        theory_rms_m: RMS that z^2 sigma / (f b) gives for this sub-pixel RMS at this distance, m.
         tiles: the same over the image.
     """
 
@@ -105,7 +122,6 @@ class PlaneQuality:
     tilt_deg: float
     bias_m: float
     true_m: float
-    theory_rms_m: float
     tiles: Tiles
 
     @property

@@ -16,7 +16,19 @@ from common.android import is_android
 from common.diagnostic import Diagnostic
 from common.errors import SettingsError, UnavailableError
 from phone_host.native.build_library import LIBRARY_FILE, REASON_FILE
-from phone_host.native.volume_jobs import AbsorbJob, CarveJob, CastJob, FuseJob, RegisterJob, TouchJob, declare
+from phone_host.native.volume_jobs import (
+    FLOAT,
+    INT,
+    INT64,
+    POINTER,
+    AbsorbJob,
+    CarveJob,
+    CastJob,
+    FuseJob,
+    RegisterJob,
+    TouchJob,
+    each,
+)
 
 VARIABLE: Final = "TANDEMSCAN_SIMD"
 """Environment variable that chooses another instruction set than the widest, to compare or to find a fault."""
@@ -58,26 +70,12 @@ class ReprojectJob(ctypes.Structure):
     """`struct tandem_reproject_job`."""
 
     _fields_ = (
-        ("disparity_px", ctypes.c_void_p),
-        ("column_slopes", ctypes.c_void_p),
-        ("row_slopes", ctypes.c_void_p),
-        ("cloud_m", ctypes.c_void_p),
-        ("disparity_stride", ctypes.c_int64),
-        ("width", ctypes.c_int32),
-        ("height", ctypes.c_int32),
-        ("doffs_px", ctypes.c_float),
-        ("product", ctypes.c_float),
-        ("least_px", ctypes.c_float),
-        ("at_zero_px", ctypes.c_float),
-        ("far_m", ctypes.c_float),
-        ("near_m", ctypes.c_float),
-        ("wide", ctypes.c_int32),
-        ("reserved", ctypes.c_int32),
-        ("found", ctypes.c_int64),
-        ("at_zero", ctypes.c_int64),
-        ("in_front", ctypes.c_int64),
-        ("too_far", ctypes.c_int64),
-        ("too_near", ctypes.c_int64),
+        *each(POINTER, "disparity_px column_slopes row_slopes cloud_m"),
+        ("disparity_stride", INT64),
+        *each(INT, "width height"),
+        *each(FLOAT, "doffs_px product least_px at_zero_px far_m near_m"),
+        *each(INT, "wide reserved"),
+        *each(INT64, "found at_zero in_front too_far too_near"),
     )
 
 
@@ -85,17 +83,12 @@ class PackJob(ctypes.Structure):
     """`struct tandem_pack_job`."""
 
     _fields_ = (
-        ("cloud_m", ctypes.c_void_p),
-        ("colours", ctypes.c_void_p),
-        ("records", ctypes.c_void_p),
-        ("cloud_stride", ctypes.c_int64),
-        ("colour_stride", ctypes.c_int64),
-        ("width", ctypes.c_int32),
-        ("height", ctypes.c_int32),
-        ("channels", ctypes.c_int32),
+        *each(POINTER, "cloud_m colours records"),
+        *each(INT64, "cloud_stride colour_stride"),
+        *each(INT, "width height channels"),
         ("flips", ctypes.c_uint8 * 3),
         ("reserved", ctypes.c_uint8),
-        ("count", ctypes.c_int64),
+        ("count", INT64),
     )
 
 
@@ -103,20 +96,11 @@ class MatchJob(ctypes.Structure):
     """`struct tandem_match_job`."""
 
     _fields_ = (
-        ("left", ctypes.c_void_p),
-        ("right", ctypes.c_void_p),
-        ("left_stride", ctypes.c_int64),
-        ("right_stride", ctypes.c_int64),
-        ("disparity", ctypes.c_void_p),
-        ("confidence", ctypes.c_void_p),
-        ("workspace", ctypes.c_void_p),
-        ("workspace_bytes", ctypes.c_int64),
-        ("width", ctypes.c_int32),
-        ("height", ctypes.c_int32),
-        ("disparities", ctypes.c_int32),
-        ("threads", ctypes.c_int32),
-        ("guide", ctypes.c_int32),
-        ("reserved", ctypes.c_int32),
+        *each(POINTER, "left right"),
+        *each(INT64, "left_stride right_stride"),
+        *each(POINTER, "disparity confidence workspace"),
+        ("workspace_bytes", INT64),
+        *each(INT, "width height disparities threads guide reserved"),
     )
 
 
@@ -124,15 +108,26 @@ class RemapJob(ctypes.Structure):
     """`struct tandem_remap_job`."""
 
     _fields_ = (
-        ("image", ctypes.c_void_p),
-        ("places", ctypes.c_void_p),
-        ("fractions", ctypes.c_void_p),
-        ("out", ctypes.c_void_p),
-        ("image_stride", ctypes.c_int64),
-        ("out_pixels", ctypes.c_int64),
-        ("image_width", ctypes.c_int32),
-        ("image_height", ctypes.c_int32),
+        *each(POINTER, "image places fractions out"),
+        *each(INT64, "image_stride out_pixels"),
+        *each(INT, "image_width image_height"),
     )
+
+
+Job = ReprojectJob | PackJob | MatchJob | RemapJob | TouchJob | FuseJob | CarveJob | CastJob | RegisterJob | AbsorbJob
+_FUNCTIONS: Final[dict[type[Job], tuple[str, bool]]] = {
+    ReprojectJob: ("tandem_reproject", True),
+    PackJob: ("tandem_pack", True),
+    MatchJob: ("tandem_match", True),
+    RemapJob: ("tandem_remap", True),
+    TouchJob: ("tandem_touch", False),
+    FuseJob: ("tandem_fuse", True),
+    CarveJob: ("tandem_carve", True),
+    CastJob: ("tandem_cast", True),
+    RegisterJob: ("tandem_register", False),
+    AbsorbJob: ("tandem_absorb", False),
+}
+"""What does each kind of job, and whether it is compiled for each instruction set: then the set's number is its first argument."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -185,49 +180,16 @@ class Library:
         """Return the digest of the sources that it was built from; see `build_library.sources_digest`."""
         return str(self.handle.tandem_sources().decode())
 
-    def reproject(self, job: ReprojectJob) -> None:
-        """Compute the points of disparities; see reproject_kernel.c."""
-        _require_done(self.handle.tandem_reproject(self.isa, ctypes.byref(job)))
-
     def match_bytes(self, job: MatchJob) -> int:
         """Return the size of the workspace that a pair needs, bytes."""
         return int(self.handle.tandem_match_bytes(self.isa, ctypes.byref(job)))
 
-    def match(self, job: MatchJob) -> None:
-        """Find the disparities of a rectified pair; see match.c."""
-        _require_done(self.handle.tandem_match(self.isa, ctypes.byref(job)))
-
-    def pack(self, job: PackJob) -> None:
-        """Pack finite points with their colours; see pack_kernel.c."""
-        _require_done(self.handle.tandem_pack(self.isa, ctypes.byref(job)))
-
-    def remap(self, job: RemapJob) -> None:
-        """See a coloured image through a map; see remap_kernel.c."""
-        _require_done(self.handle.tandem_remap(self.isa, ctypes.byref(job)))
-
-    def touch(self, job: TouchJob) -> None:
-        """Make room where a depth image shows a surface; see volume.c."""
-        _require_done(self.handle.tandem_touch(ctypes.byref(job)))
-
-    def fuse(self, job: FuseJob) -> None:
-        """Fuse a depth image into a volume; see fuse_kernel.c."""
-        _require_done(self.handle.tandem_fuse(self.isa, ctypes.byref(job)))
-
-    def carve(self, job: CarveJob) -> None:
-        """Note where a camera looked through a grid of cells; see carve_kernel.c."""
-        _require_done(self.handle.tandem_carve(self.isa, ctypes.byref(job)))
-
-    def cast(self, job: CastJob) -> None:
-        """Show a volume's surface as a camera sees it; see cast_kernel.c."""
-        _require_done(self.handle.tandem_cast(self.isa, ctypes.byref(job)))
-
-    def absorb(self, job: AbsorbJob) -> None:
-        """Take a field into another; see absorb.c."""
-        _require_done(self.handle.tandem_absorb(ctypes.byref(job)))
-
-    def register(self, job: RegisterJob) -> None:
-        """Compare a depth image with such a surface; see register.c."""
-        _require_done(self.handle.tandem_register(ctypes.byref(job)))
+    def run(self, job: Job) -> None:
+        """Do a job by the C function of its kind; src/tandem.h says what each computes, and which fields it fills."""
+        name, is_per_set = _FUNCTIONS[type(job)]
+        result = getattr(self.handle, name)(*([self.isa] if is_per_set else []), ctypes.byref(job))
+        # The set was checked when the library was made, so another answer is a fault of ours.
+        assert result == 0, f"the native library answered {result}"
 
 
 @cache
@@ -325,7 +287,6 @@ def _choices(library: Library) -> str:
 
 def _declare(handle: ctypes.CDLL) -> None:
     """State the arguments and results of the library's functions."""
-    declare(handle)
     handle.tandem_abi.argtypes, handle.tandem_abi.restype = [], ctypes.c_int32
     handle.tandem_sources.argtypes, handle.tandem_sources.restype = [], ctypes.c_char_p
     handle.tandem_isa_name.argtypes, handle.tandem_isa_name.restype = [ctypes.c_int32], ctypes.c_char_p
@@ -333,15 +294,7 @@ def _declare(handle: ctypes.CDLL) -> None:
     handle.tandem_isa_best.argtypes, handle.tandem_isa_best.restype = [], ctypes.c_int32
     handle.tandem_match_bytes.argtypes = [ctypes.c_int32, ctypes.POINTER(MatchJob)]
     handle.tandem_match_bytes.restype = ctypes.c_int64
-    for function, job in (
-        (handle.tandem_reproject, ReprojectJob),
-        (handle.tandem_pack, PackJob),
-        (handle.tandem_remap, RemapJob),
-        (handle.tandem_match, MatchJob),
-    ):
-        function.argtypes, function.restype = [ctypes.c_int32, ctypes.POINTER(job)], ctypes.c_int32
-
-
-def _require_done(result: int) -> None:
-    """Check a result; the set was checked when the library was made, so another answer is a fault of ours."""
-    assert result == 0, f"the native library answered {result}"
+    for job, (name, is_per_set) in _FUNCTIONS.items():
+        function = getattr(handle, name)
+        function.argtypes = [*([ctypes.c_int32] if is_per_set else []), ctypes.POINTER(job)]
+        function.restype = ctypes.c_int32

@@ -1,17 +1,23 @@
 """The jobs of the native library that concern a volume, as src/tandem.h declares them; `library` runs them."""
 
 import ctypes
+from typing import Any
 
-_POINTER = ctypes.c_void_p
-_INT = ctypes.c_int32
-_FLOAT = ctypes.c_float
+POINTER = ctypes.c_void_p
+INT = ctypes.c_int32
+INT64 = ctypes.c_int64
+FLOAT = ctypes.c_float
 _POSE = ctypes.c_float * 12
+
+
+def each(kind: type[Any], names: str) -> tuple[tuple[str, type[Any]], ...]:
+    """Return fields of one kind, in the order of their names, which blanks part."""
+    return tuple((name, kind) for name in names.split())
+
+
 _CAMERA = (
-    ("width", _INT),
-    ("height", _INT),
-    ("focal_px", _FLOAT),
-    ("cx_px", _FLOAT),
-    ("cy_px", _FLOAT),
+    *each(INT, "width height"),
+    *each(FLOAT, "focal_px cx_px cy_px"),
 )
 
 
@@ -19,16 +25,10 @@ class VolumeArrays(ctypes.Structure):
     """`struct tandem_volume`."""
 
     _fields_ = (
-        ("slots", _POINTER),
-        ("places", _POINTER),
-        ("field", _POINTER),
-        ("weights", _POINTER),
-        ("colours", _POINTER),
-        ("slot_count", ctypes.c_int64),
-        ("room", _INT),
-        ("count", _INT),
-        ("voxel_m", _FLOAT),
-        ("truncation_m", _FLOAT),
+        *each(POINTER, "slots places field weights colours"),
+        ("slot_count", INT64),
+        *each(INT, "room count"),
+        *each(FLOAT, "voxel_m truncation_m"),
     )
 
 
@@ -37,13 +37,12 @@ class TouchJob(ctypes.Structure):
 
     _fields_ = (
         ("volume", ctypes.POINTER(VolumeArrays)),
-        ("depth_m", _POINTER),
+        ("depth_m", POINTER),
         ("world_camera", _POSE),
         *_CAMERA,
-        ("far_m", _FLOAT),
-        ("step", _INT),
-        ("reserved", _INT),
-        ("missing", ctypes.c_int64),
+        ("far_m", FLOAT),
+        *each(INT, "step reserved"),
+        ("missing", INT64),
     )
 
 
@@ -52,18 +51,11 @@ class FuseJob(ctypes.Structure):
 
     _fields_ = (
         ("volume", ctypes.POINTER(VolumeArrays)),
-        ("depth_m", _POINTER),
-        ("colours", _POINTER),
-        ("changed", _POINTER),
+        *each(POINTER, "depth_m colours changed"),
         ("camera_world", _POSE),
         *_CAMERA,
-        ("far_m", _FLOAT),
-        ("noise_per_m", _FLOAT),
-        ("sure_m", _FLOAT),
-        ("weight_one", _FLOAT),
-        ("most_weight", _INT),
-        ("threads", _INT),
-        ("reserved", _INT),
+        *each(FLOAT, "far_m noise_per_m sure_m weight_one"),
+        *each(INT, "most_weight threads reserved"),
     )
 
 
@@ -71,19 +63,14 @@ class CarveJob(ctypes.Structure):
     """`struct tandem_carve_job`."""
 
     _fields_ = (
-        ("looked_through", _POINTER),
-        ("hidden", _POINTER),
-        ("blank", _POINTER),
-        ("depth_m", _POINTER),
+        *each(POINTER, "looked_through hidden blank depth_m"),
         ("camera_world", _POSE),
-        ("counts", _INT * 3),
-        ("low_m", _FLOAT * 3),
-        ("cell_m", _FLOAT),
+        ("counts", INT * 3),
+        ("low_m", FLOAT * 3),
+        ("cell_m", FLOAT),
         *_CAMERA,
-        ("noise_per_m", _FLOAT),
-        ("sigmas", _FLOAT),
-        ("clear_m", _FLOAT),
-        ("threads", _INT),
+        *each(FLOAT, "noise_per_m sigmas clear_m"),
+        ("threads", INT),
     )
 
 
@@ -92,16 +79,11 @@ class CastJob(ctypes.Structure):
 
     _fields_ = (
         ("volume", ctypes.POINTER(VolumeArrays)),
-        ("seeds_m", _POINTER),
-        ("points_m", _POINTER),
-        ("normals", _POINTER),
+        *each(POINTER, "seeds_m points_m normals"),
         ("world_camera", _POSE),
         *_CAMERA,
-        ("near_m", _FLOAT),
-        ("far_m", _FLOAT),
-        ("search", _INT),
-        ("threads", _INT),
-        ("reserved", _INT),
+        *each(FLOAT, "near_m far_m"),
+        *each(INT, "search threads reserved"),
     )
 
 
@@ -109,19 +91,11 @@ class RegisterJob(ctypes.Structure):
     """`struct tandem_register_job`."""
 
     _fields_ = (
-        ("depth_m", _POINTER),
-        ("points_m", _POINTER),
-        ("normals", _POINTER),
-        ("sums", _POINTER),
+        *each(POINTER, "depth_m points_m normals sums"),
         ("model_camera", _POSE),
         *_CAMERA,
-        ("most_m", _FLOAT),
-        ("floor_m", _FLOAT),
-        ("noise_per_m", _FLOAT),
-        ("huber_sigmas", _FLOAT),
-        ("step", _INT),
-        ("threads", _INT),
-        ("reserved", _INT),
+        *each(FLOAT, "most_m floor_m noise_per_m huber_sigmas"),
+        *each(INT, "step threads reserved"),
     )
 
 
@@ -129,22 +103,8 @@ class AbsorbJob(ctypes.Structure):
     """`struct tandem_absorb_job`."""
 
     _fields_ = (
-        ("into", ctypes.POINTER(VolumeArrays)),
-        ("of", ctypes.POINTER(VolumeArrays)),
-        ("chosen", _POINTER),
+        *each(ctypes.POINTER(VolumeArrays), "into of"),
+        ("chosen", POINTER),
         ("of_into", ctypes.c_double * 12),
-        ("most_weight", _INT),
-        ("threads", _INT),
+        *each(INT, "most_weight threads"),
     )
-
-
-def declare(handle: ctypes.CDLL) -> None:
-    """State the arguments and results of these functions."""
-    handle.tandem_fuse.argtypes = [_INT, ctypes.POINTER(FuseJob)]
-    handle.tandem_carve.argtypes = [_INT, ctypes.POINTER(CarveJob)]
-    handle.tandem_cast.argtypes = [_INT, ctypes.POINTER(CastJob)]
-    handle.tandem_touch.argtypes = [ctypes.POINTER(TouchJob)]
-    handle.tandem_register.argtypes = [ctypes.POINTER(RegisterJob)]
-    handle.tandem_absorb.argtypes = [ctypes.POINTER(AbsorbJob)]
-    for name in ("fuse", "carve", "cast", "touch", "register", "absorb"):
-        getattr(handle, f"tandem_{name}").restype = _INT

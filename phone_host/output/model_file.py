@@ -9,7 +9,7 @@ from typing import Final
 from common.errors import DataError
 from common.files import read_whole
 from common.places import Kind, kind_of
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.formats import read_mesh
 from phone_host.output.meshes.solid import Solid

@@ -166,7 +166,7 @@ def packed_points(
         channels=3 if colours.ndim == 3 else 1,
         flips=tuple(int(sign < 0) for sign in axes.signs),
     )
-    library.pack(job)
+    library.run(job)
     return records[: job.count]
 
 

@@ -7,12 +7,11 @@ from typing import Final, assert_never
 from common.byte_order_mark import without_mark
 from common.errors import SettingsError, UnavailableError
 from phone_host.output.atomic import write_bytes
-from phone_host.printers.door import Job, PrinterDoor, Wishes
-from phone_host.printers.host_commands import passed_note
+from phone_host.printers.door import Ended, Job, Phase, PrinterDoor, Progress, Wishes
+from phone_host.printers.gcode import passed_note
 from phone_host.printers.moonraker import Moonraker
 from phone_host.printers.octoprint import OctoPrint
 from phone_host.printers.printer_uri import FileUri, LineUri, PrinterUri, ServerKind, ServerUri, read_uri
-from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.prusalink import PrusaLink
 from phone_host.printers.sending import LineDoor
 from phone_host.printers.server_door import ServerDoor, ServerPatience

@@ -2,20 +2,61 @@
 
 Rules: lines go one by one, a file of any length takes no memory. Comments and blanks are left away; a line that no firmware takes is refused
 with its number.
-Source: the RepRap wiki, "G-code" (https://reprap.org/wiki/G-code); Marlin's G-code index (https://marlinfw.org/meta/gcode).
+
+Lines that begin with `@` are for the host, not for the printer. OctoPrint obeys `@pause`, `@resume`, `@cancel` and `@abort`; Repetier-Host, from which
+they come, also has `@kill`, and `@info` and others for its own windows; plugins have more (`@PAUSE_POSITION`). Cura's "Pause at height" writes `@pause` for
+both. A printer knows none of them.
+Source: the RepRap wiki, "G-code" (https://reprap.org/wiki/G-code); Marlin's G-code index (https://marlinfw.org/meta/gcode);
+OctoPrint's documentation, "@ Commands"; Cura's PauseAtHeight.py.
 """
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 from common.errors import DataError
-from phone_host.printers.bed import USUAL_BED, Bed, bed_of_settings, stated_bed
+from phone_host.printers.bed import USUAL_BED, Bed, Place, PrintPath, bed_of_settings, stated_bed, words_of
 from phone_host.printers.cooling import MAX_TOOL
-from phone_host.printers.host_commands import host_command
-from phone_host.printers.nozzle_path import Place, PrintPath, words_of
+from phone_host.printers.marlin_reply import HostAction
+
+_COMMAND: Final = re.compile(r"@([A-Za-z]\w*)(?:\s.*)?")
+_ACTIONS: Final = {
+    "pause": HostAction.PAUSE,
+    "resume": HostAction.RESUME,
+    "cancel": HostAction.CANCEL,
+    "abort": HostAction.CANCEL,
+    "kill": HostAction.CANCEL,
+}
+
+
+def host_command(text: str) -> str:
+    """Return the name of a command for the host, in small letters; empty: the line is none.
+
+    Args:
+        text: a line of G-code, without comment and blanks around it.
+    """
+    found = _COMMAND.fullmatch(text)
+    return found[1].lower() if found and text.isprintable() else ""
+
+
+def action_of(name: str) -> HostAction:
+    """Return what a command wants; NONE: it is for another host."""
+    return _ACTIONS.get(name, HostAction.NONE)
+
+
+def ignored_note(names: Sequence[str]) -> tuple[str, ...]:
+    """Return a sentence on the commands that are not obeyed here; nothing if there are none."""
+    others = [f"@{name}" for name in names if action_of(name) is HostAction.NONE]
+    return (f"its G-code has commands for another host ({', '.join(others)}): they were ignored",) if others else ()
+
+
+def passed_note(names: Sequence[str], whose: str) -> tuple[str, ...]:
+    """Return a sentence on commands in a file that somebody else prints; nothing if there are none."""
+    listed = ", ".join(f"@{name}" for name in names)
+    return (f"its G-code has commands for a host ({listed}): {whose} obeys or ignores them",) if names else ()
+
 
 MOST_FOR_LINES: Final = 90
 """Marlin's lines hold 96 (MAX_CMD_SIZE), number and checksum included."""

@@ -15,25 +15,33 @@ from collections.abc import Iterator
 from typing import Final, assert_never
 
 from common.diagnostic import Diagnostic
-from phone_host.printers import marlin_problems as problems
-from phone_host.printers.cooling import wake
+from phone_host.printers.cooling import CoolingCheck, wake
+from phone_host.printers.door import Heat, Phase
 from phone_host.printers.gcode import Line, name_of
-from phone_host.printers.marlin_cooling import CoolingCheck
 from phone_host.printers.marlin_reply import HostAction, Reply, ReplyKind, read_reply
 from phone_host.printers.marlin_rules import (
     ALIVE_NS,
+    NO_FAILURE,
+    RESTARTED,
     SECOND_NS,
+    SILENT,
     Attempts,
     Guard,
     PlannedLine,
     SenderOptions,
     SentLine,
+    ended_there,
     framed,
     is_done_now,
     is_long,
+    long_sent,
+    no_progress,
+    not_finished,
+    not_sent_yet,
     patience_ns,
+    printer_says,
+    still_heating,
 )
-from phone_host.printers.progress import Heat, Phase
 
 _START_NS: Final = 3 * SECOND_NS
 """A board that restarts when its port is opened says `start` within this; others say nothing."""
@@ -59,7 +67,7 @@ class MarlinSender:
         resent: lines that were sent again.
         heat: the last temperatures that were reported.
         message: what the printer shows or waits for; empty: nothing.
-        failure: why it failed; problems.NO_FAILURE: it did not.
+        failure: why it failed; NO_FAILURE: it did not.
         off: lines that switch off what the print heats.
         cooling: whether the printer has done them.
     """
@@ -82,12 +90,7 @@ class MarlinSender:
         self.phase = Phase.OPENING
         self.done = self.resent = 0
         self.heat = Heat()
-        self.message, self.failure = "", problems.NO_FAILURE
-
-    @property
-    def may_pause(self) -> bool:
-        """Whether there is something to pause."""
-        return self.phase is Phase.PRINTING
+        self.message, self.failure = "", NO_FAILURE
 
     def pause(self) -> None:
         """Send nothing more for now; heaters stay on."""
@@ -118,7 +121,7 @@ class MarlinSender:
     def finish_cancelling(self) -> None:
         """End it: what cools was confirmed, or the printer says that it heats all the same; the rest is not waited for."""
         if self._ended_there and not self.cooling.hot:
-            self._fail(problems.ended_there(self._ended_there, is_cold=not self.cooling.is_unreported))
+            self._fail(ended_there(self._ended_there, is_cold=not self.cooling.is_unreported))
         else:
             self._end(Phase.CANCELLED)
 
@@ -133,7 +136,7 @@ class MarlinSender:
             case ReplyKind.START:
                 self._started(now_ns)
             case ReplyKind.FATAL:
-                self._fail(problems.printer_says(reply.text))
+                self._fail(printer_says(reply.text))
             case ReplyKind.ERROR:
                 self._refused_order = reply.is_about_order
                 self._note_unguarded(reply)
@@ -189,7 +192,7 @@ class MarlinSender:
                 self._queue, self._under_way = [self._under_way.line, *self._queue], None
             self._number = 0
         else:
-            self._fail(problems.RESTARTED)
+            self._fail(RESTARTED)
 
     def _act(self, reply: Reply) -> None:
         """Do what the printer's display wants."""
@@ -259,9 +262,9 @@ class MarlinSender:
             self._is_doubted = True
             self._go_back(under_way, under_way.number, now_ns)
         elif self._attempts.are_begun_again(number):
-            self._fail(problems.RESTARTED)
+            self._fail(RESTARTED)
         else:
-            self._fail(problems.not_sent_yet(number) if number > self._number else problems.long_sent(number))
+            self._fail(not_sent_yet(number) if number > self._number else long_sent(number))
 
     def _go_back(self, under_way: SentLine, number: int, now_ns: int) -> None:
         is_new = not under_way.is_requested
@@ -303,7 +306,7 @@ class MarlinSender:
 
     def _sent_again(self, under_way: SentLine, now_ns: int) -> bytes:
         if now_ns - self._began_ns > self._options.max_busy_ns:
-            self._fail(problems.not_finished(under_way.line.text, self._options.max_busy_ns))
+            self._fail(not_finished(under_way.line.text, self._options.max_busy_ns))
             return b""
         if under_way.is_requested:
             if now_ns < self._awaited_ok_ns:
@@ -316,7 +319,7 @@ class MarlinSender:
             self._attempts.timeouts += 1
         under_way.tries += 1
         if under_way.tries >= _MAX_TRIES and now_ns - self._last_heard_ns > self._options.usual_ns:
-            self._fail(problems.SILENT)
+            self._fail(SILENT)
             return b""
         if self._is_given_up(under_way):
             return b""
@@ -326,7 +329,7 @@ class MarlinSender:
     def _is_given_up(self, sent: SentLine) -> bool:
         """Return whether lines were repeated too often, which ends the print."""
         if self._attempts.are_too_many:
-            self._fail(problems.no_progress(sent, self._attempts))
+            self._fail(no_progress(sent, self._attempts))
         return self._attempts.are_too_many
 
     def _sent_next(self, now_ns: int) -> bytes:
@@ -382,7 +385,7 @@ class MarlinSender:
     def _end(self, phase: Phase) -> None:
         """End the print as it was meant to, unless the printer says that a heater is on."""
         if self.cooling.hot:
-            self._fail(problems.still_heating(self.cooling.hot))
+            self._fail(still_heating(self.cooling.hot))
         else:
             self.phase = phase
 

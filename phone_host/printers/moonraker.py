@@ -1,6 +1,5 @@
 """Moonraker, the server before Klipper, by its HTTP API. Source: Moonraker's documentation, "External API" (https://moonraker.readthedocs.io)."""
 
-import json
 import math
 from collections.abc import Callable
 from contextlib import suppress
@@ -9,20 +8,12 @@ from typing import Final
 from urllib.parse import quote
 
 from common.errors import UnavailableError
+from phone_host.printers.door import Heat
 from phone_host.printers.printer_uri import ServerUri
-from phone_host.printers.progress import Heat
-from phone_host.printers.server import (
-    Condition,
-    ServerState,
-    form_of,
-    note_refusal,
-    require_good,
-    require_key,
-)
-from phone_host.printers.server_answer import Answer, Value, or_zero
-from phone_host.printers.server_talk import ORDER_S, ServerLostError, ServerTalk
+from phone_host.printers.server import Condition, KeyedServer, ServerState, form_of, note_refusal, require_good
+from phone_host.printers.server_answer import Value, or_zero
+from phone_host.printers.server_talk import ServerLostError
 
-_WHERE: Final = "Fluidd and Mainsail show it under Settings, Authorization"
 _OF_STATE: Final = {
     "standby": Condition.READY,
     "printing": Condition.PRINTING,
@@ -36,7 +27,7 @@ _OF_STATE: Final = {
 _OF_KLIPPER: Final = {"startup": Condition.BUSY, "error": Condition.ERROR, "shutdown": Condition.ERROR}
 
 
-class Moonraker:
+class Moonraker(KeyedServer):
     """See PrintServer.
 
     Args:
@@ -45,8 +36,7 @@ class Moonraker:
     """
 
     def __init__(self, uri: ServerUri, key: str) -> None:
-        self._talk, self._key, self._example = ServerTalk(uri), key, f'"{uri.text}" = "KEY"'
-        self.title = self._talk.server
+        super().__init__(uri, key, "Fluidd and Mainsail show it under Settings, Authorization")
         self._heaters: tuple[str, ...] = ()
 
     def state(self) -> ServerState:
@@ -56,9 +46,7 @@ class Moonraker:
         if klipper != "ready":
             words = self._why() or f"Klipper is {klipper or 'not there'}"
             condition = _OF_KLIPPER.get(klipper, Condition.OFFLINE)
-            return ServerState(
-                condition=condition, share=0.0, seconds_left=math.nan, heat=Heat(), is_hot=False, words=words
-            )
+            return ServerState(condition=condition, words=words)
         if not self._heaters:
             self._heaters = self._told("/printer/objects/query?heaters")["status"]["heaters"]["available_heaters"].texts
         asked = "&".join(quote(name) for name in ("print_stats", "virtual_sdcard", *self._heaters))
@@ -68,11 +56,7 @@ class Moonraker:
     def start(self, gcode: Path, name: str, sent: Callable[[float], None]) -> None:
         """See PrintServer."""
         form = form_of(name, {"root": "gcodes", "print": "true"})
-        headers = {**self._headers(), "Content-Type": form.content_type}
-        answer = self._talk.hand_over("POST", "/server/files/upload", headers, form.body(gcode, sent), form.size(gcode))
-        require_key(answer, self._key, self._example, _WHERE)
-        require_good(answer, "the file")
-        said = answer.json()
+        said = self._given("/server/files/upload", form, gcode, sent).json()
         started = said["print_started"] if "print_started" in said.keys else said["result"]["print_started"]
         if started.is_false:
             raise UnavailableError(f"{self.title} has the file, but did not start it", "look at its own page")
@@ -88,11 +72,11 @@ class Moonraker:
     def cancel(self) -> None:
         """See PrintServer. The macro behind it is the user's own; many leave heaters on, so `cool` follows."""
         with suppress(ServerLostError):
-            require_good(self._ordered("/printer/print/cancel"), "to end the print")
+            require_good(self._ordered("/printer/print/cancel", {}), "to end the print")
 
     def cool(self) -> bool:
         """See PrintServer."""
-        answer = self._ordered(f"/printer/gcode/script?script={quote('TURN_OFF_HEATERS')}")
+        answer = self._ordered(f"/printer/gcode/script?script={quote('TURN_OFF_HEATERS')}", {})
         require_good(answer, "to switch its heaters off")
         return True
 
@@ -101,34 +85,20 @@ class Moonraker:
         self._do("/printer/emergency_stop", "stopping")
         return "give FIRMWARE_RESTART on its page"
 
-    def hurry(self) -> None:
-        """See PrintServer."""
-        self._talk.hurry()
-
-    def _headers(self) -> dict[str, str]:
-        return {"X-Api-Key": self._key} if self._key else {}
-
     def _why(self) -> str:
         """What Klipper says of itself; nothing where it is not connected."""
         answer = self._talk.ask("GET", "/printer/info", self._headers())
         return answer.json()["result"]["state_message"].text if answer.is_good else ""
 
     def _told(self, target: str) -> Value:
-        answer = self._talk.ask("GET", target, self._headers())
-        require_key(answer, self._key, self._example, _WHERE)
+        answer = self._asked(target)
         require_good(answer, "to tell how its printer is")
         return answer.json()["result"]
 
     def _do(self, target: str, what: str) -> None:
         """Give an order. Klipper answers when it was done, which may be after it has heated; it is done all the same."""
         with suppress(ServerLostError):  # it is done later, or the next question tells that the server is gone
-            note_refusal(self._ordered(target), what)
-
-    def _ordered(self, target: str) -> Answer:
-        headers = {**self._headers(), "Content-Type": "application/json"}
-        answer = self._talk.ask("POST", target, headers, json.dumps({}).encode(), ORDER_S)
-        require_key(answer, self._key, self._example, _WHERE)
-        return answer
+            note_refusal(self._ordered(target, {}), what)
 
 
 def _state(status: Value, heaters: tuple[str, ...]) -> ServerState:

@@ -1,11 +1,13 @@
-"""Where a printer is, as the user writes it: a line (serial:DEVICE), a server (octoprint://HOST:PORT), or a file (file:OUT.gcode). Pure."""
+"""Where a printer is, as the user writes it: a line (serial:DEVICE), a server (octoprint://HOST:PORT), or a file (file:OUT.gcode); and which are among the services that announce themselves in a network. Pure."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, assert_never
 
 from common.errors import SettingsError
+from phone_host.discovery.found import Announcement
 
 _REMEDY: Final = (
     "give octoprint://HOST, moonraker://HOST, prusalink://HOST, serial:/dev/ttyUSB0?baud=115200, rfcomm://00:11:22:33:44:55,"
@@ -161,3 +163,38 @@ def _number(text: str, query: str, name: str, usual: int) -> int:
     if key != name or not (value.isascii() and value.isdecimal()) or len(value) > 9:
         raise SettingsError(f"--printer {text!r}: {query!r} is no option", f"give ?{name}={usual}")
     return int(value)
+
+
+_KINDS: Final = {
+    "_octoprint._tcp.local.": ServerKind.OCTOPRINT,
+    "_moonraker._tcp.local.": ServerKind.MOONRAKER,
+    "_prusalink._tcp.local.": ServerKind.PRUSALINK,
+}
+_WEB: Final = "_http._tcp.local."
+"""Some announce themselves only as a web page; then the name tells."""
+
+SERVICES: Final = (*_KINDS, _WEB)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class FoundPrinter:
+    """A printer that announces itself."""
+
+    uri: str
+    name: str
+
+
+def printers_of(announcements: Iterable[Announcement]) -> list[FoundPrinter]:
+    """Return the printers, sorted by address, each once.
+
+    Args:
+        announcements: what was heard; it may come from anybody.
+    """
+    found: dict[str, FoundPrinter] = {}
+    for each in announcements:
+        kind = _KINDS.get(each.service) or next((kind for kind in ServerKind if kind.value in each.name.lower()), None)
+        if kind is not None:
+            uri = f"{kind.value}://{each.host}:{each.port}"
+            name = "".join(character if character.isprintable() else " " for character in each.name)[:60]
+            found.setdefault(uri, FoundPrinter(uri, name))
+    return sorted(found.values())

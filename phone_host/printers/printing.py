@@ -11,9 +11,8 @@ from typing import Final
 from common import now
 from common.errors import TandemError, UnavailableError
 from common.unfinished import unfinished
-from phone_host.printers.door import Job, PrinterDoor, Wishes
+from phone_host.printers.door import Ended, Job, Phase, PrinterDoor, Progress, Wishes
 from phone_host.printers.journal import Entry, Journal, JournalEntry
-from phone_host.printers.progress import Ended, Phase, Progress
 
 _NOTE_NS: Final = 5_000_000_000
 _STEP_S: Final = 0.1
@@ -77,6 +76,10 @@ def _noting(
 class RunningPrint:
     """A print in a thread of its own. Every method may be called from any thread, and returns at once.
 
+    Attributes:
+        progress: how far it is.
+        outcome: how it ended, or the error that ended it; None: it goes on.
+
     Args:
         place: where.
         job: what; its file stays until the print has ended.
@@ -96,23 +99,13 @@ class RunningPrint:
         self._place, self._job = place, job
         self._tell, self._told_over = tell, over
         self._wishes, self._is_over = wishes or Wishes(), threading.Event()
-        self._progress = Progress(phase=Phase.OPENING)
-        self._outcome: Ended | TandemError | None = None
+        self.progress = Progress(phase=Phase.OPENING)
+        self.outcome: Ended | TandemError | None = None
         self._thread = threading.Thread(target=self._run, name="print", daemon=False)
 
     def start(self) -> None:
         """Begin. The user has been asked before."""
         self._thread.start()
-
-    @property
-    def progress(self) -> Progress:
-        """How far it is."""
-        return self._progress
-
-    @property
-    def outcome(self) -> Ended | TandemError | None:
-        """How it ended, or the error that ended it; None: it goes on."""
-        return self._outcome
 
     def pause(self) -> None:
         """Pause it; heaters stay on."""
@@ -141,17 +134,17 @@ class RunningPrint:
         Raises:
             TandemError: what ended it.
         """
-        assert self._outcome is not None
-        if isinstance(self._outcome, TandemError):
-            raise self._outcome
-        return self._outcome
+        assert self.outcome is not None
+        if isinstance(self.outcome, TandemError):
+            raise self.outcome
+        return self.outcome
 
     def _run(self) -> None:
         with unfinished(self._abandon):
-            self._outcome = self._printed()
+            self.outcome = self._printed()
             self._is_over.set()
         if self._told_over is not None:
-            self._told_over(self._outcome)
+            self._told_over(self.outcome)
 
     def _printed(self) -> Ended | TandemError:
         try:
@@ -181,7 +174,7 @@ class RunningPrint:
         return "; ".join(ended.notes)
 
     def _heard(self, progress: Progress) -> None:
-        self._progress = progress
+        self.progress = progress
         if self._tell is not None:
             self._tell(progress)
 

@@ -11,21 +11,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
+from phone_host.printers.door import Heat
 from phone_host.printers.printer_uri import ServerUri
-from phone_host.printers.progress import Heat
 from phone_host.printers.server import (
     Condition,
+    KeyedServer,
     ServerState,
     note_refusal,
     pieces,
     require_good,
-    require_key,
     size_bytes,
 )
 from phone_host.printers.server_answer import Answer, or_zero
-from phone_host.printers.server_talk import ANSWER_S, ORDER_S, ServerTalk
+from phone_host.printers.server_talk import ANSWER_S, ORDER_S
 
-_WHERE: Final = "the printer shows it under Settings, Network, PrusaLink"
 _OF_STATE: Final = {
     "IDLE": Condition.READY,
     "READY": Condition.READY,
@@ -44,7 +43,7 @@ _PART: Final = re.compile(r'(\w+)\s*=\s*(?:"([^"]*)"|([^\s,]+))')
 _HASHES: Final = {"MD5": hashlib.md5, "SHA-256": hashlib.sha256}
 
 
-class PrusaLink:
+class PrusaLink(KeyedServer):
     """See PrintServer.
 
     Args:
@@ -53,10 +52,9 @@ class PrusaLink:
     """
 
     def __init__(self, uri: ServerUri, key: str) -> None:
-        self._talk, self._key, self._example = ServerTalk(uri), key, f'"{uri.text}" = "KEY"'
+        super().__init__(uri, key, "the printer shows it under Settings, Network, PrusaLink")
         self._user, _, self._password = key.partition(":") if ":" in key else ("", "", "")
         self._job = self._challenge = ""
-        self.title = self._talk.server
 
     def state(self) -> ServerState:
         """See PrintServer."""
@@ -88,11 +86,9 @@ class PrusaLink:
         """See PrintServer."""
         target = f"/api/v1/files{self._store()}/{name}"
         headers = {"Content-Type": "text/x.gcode", "Print-After-Upload": "?1", "Overwrite": "?1"}
-        headers |= self._headers("PUT", target, self._challenge)
-        size = size_bytes(gcode)
-        answer = self._talk.hand_over("PUT", target, headers, pieces(gcode, sent), size)
-        require_key(answer, self._key, self._example, _WHERE)
-        require_good(answer, "the file")
+        headers |= self._proof("PUT", target)
+        answer = self._talk.hand_over("PUT", target, headers, pieces(gcode, sent), size_bytes(gcode))
+        require_good(self._accepted(answer), "the file")
 
     def pause(self) -> None:
         """See PrintServer."""
@@ -117,10 +113,6 @@ class PrusaLink:
         """See PrintServer."""
         return ""
 
-    def hurry(self) -> None:
-        """See PrintServer."""
-        self._talk.hurry()
-
     def _store(self) -> str:
         """Return where files go: the first store that is there and takes them."""
         answer = self._ask("GET", "/api/v1/storage")
@@ -131,24 +123,22 @@ class PrusaLink:
                 return f"/{path.strip('/')}"
         return _USUAL_STORE
 
-    def _headers(self, method: str, target: str, challenge: str) -> dict[str, str]:
+    def _proof(self, method: str, target: str) -> dict[str, str]:
+        """Return the headers that show the key, or prove that the password is known."""
         if not self._user:
-            return {"X-Api-Key": self._key} if self._key else {}
-        if not challenge:
+            return self._headers()
+        if not self._challenge:
             return {}
-        said = digest_header(challenge, self._user, self._password, (method, target), secrets.token_hex(8))
+        said = digest_header(self._challenge, self._user, self._password, (method, target), secrets.token_hex(8))
         return {"Authorization": said} if said else {}
 
     def _ask(self, method: str, target: str, patience_s: float = ANSWER_S) -> Answer:
         """Ask; where a user's password is given and asked for, ask again with its proof."""
-        answer = self._talk.ask(method, target, self._headers(method, target, self._challenge), patience_s=patience_s)
+        answer = self._talk.ask(method, target, self._proof(method, target), patience_s=patience_s)
         if answer.status == _UNAUTHORIZED and self._user and answer.challenge:
             self._challenge = answer.challenge
-            answer = self._talk.ask(
-                method, target, self._headers(method, target, self._challenge), patience_s=patience_s
-            )
-        require_key(answer, self._key, self._example, _WHERE)
-        return answer
+            answer = self._talk.ask(method, target, self._proof(method, target), patience_s=patience_s)
+        return self._accepted(answer)
 
 
 def digest_header(challenge: str, user: str, password: str, asked: tuple[str, str], client_nonce: str) -> str:

@@ -12,17 +12,14 @@ from typing import Final, assert_never
 from common import now
 from common.errors import DataError, TandemError
 from phone_host.printers.cooling import heaters_off, last_lines
-from phone_host.printers.door import Job, Wishes
-from phone_host.printers.gcode import GcodeFacts, lines_of
+from phone_host.printers.door import Ended, Job, Phase, Progress, Wishes
+from phone_host.printers.gcode import GcodeFacts, action_of, ignored_note, lines_of
 from phone_host.printers.gcode import Line as GcodeLine
-from phone_host.printers.host_commands import action_of, ignored_note
 from phone_host.printers.line import GOODBYE_S, WRITE_S, Line, PrinterGoneError, open_line, require_allowed
 from phone_host.printers.marlin import MarlinSender
-from phone_host.printers.marlin_problems import UNREPORTED
 from phone_host.printers.marlin_reply import HostAction
-from phone_host.printers.marlin_rules import SECOND_NS, SenderOptions
+from phone_host.printers.marlin_rules import SECOND_NS, UNREPORTED, SenderOptions
 from phone_host.printers.printer_uri import LineUri
-from phone_host.printers.progress import Ended, Phase, Progress
 
 _TELL_NS: Final = SECOND_NS // 4
 _LEAST_WAIT_S, _MOST_WAIT_S = 0.01, 0.1

@@ -1,16 +1,20 @@
 """What every printer's server can be asked, in one way; each kind has a module of its own."""
 
+import json
 import logging
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Final, Protocol
 
 from common.byte_order_mark import UTF_8_MARK
 from common.errors import DataError, SettingsError, UnavailableError
-from phone_host.printers.progress import Heat
+from phone_host.printers.door import Heat
+from phone_host.printers.printer_uri import ServerUri
 from phone_host.printers.server_answer import Answer
+from phone_host.printers.server_talk import ORDER_S, ServerTalk
 
 _PIECE: Final = 1 << 16
 _BOUNDARY: Final = "tandemscan-7d1f4c0b9e"
@@ -28,11 +32,6 @@ class Condition(Enum):
     CANCELLED = "cancelled"
     ERROR = "error"
     OFFLINE = "offline"
-
-    @property
-    def is_idle(self) -> bool:
-        """Whether it would take a print."""
-        return self in {Condition.READY, Condition.DONE, Condition.CANCELLED}
 
     @property
     def is_active(self) -> bool:
@@ -54,10 +53,10 @@ class ServerState:
     """
 
     condition: Condition
-    share: float
-    seconds_left: float
-    heat: Heat
-    is_hot: bool
+    share: float = 0.0
+    seconds_left: float = math.nan
+    heat: Heat = field(default_factory=Heat)
+    is_hot: bool = False
     words: str = ""
 
 
@@ -183,27 +182,6 @@ def form_of(name: str, fields: dict[str, str]) -> Form:
     return Form(head.encode(), f"\r\n--{_BOUNDARY}--\r\n".encode())
 
 
-def require_key(answer: Answer, key: str, example: str, where: str) -> None:
-    """Refuse an answer that wants another key.
-
-    Args:
-        answer: of the server.
-        key: that was given; empty: none.
-        example: of the line in the settings file.
-        where: the server shows its key.
-
-    Raises:
-        SettingsError: it does.
-    """
-    if answer.status not in {401, 403}:
-        return
-    if key:
-        raise SettingsError(f"{answer.server} does not take the key of the settings file", f"copy it again: {where}")
-    raise SettingsError(
-        f"{answer.server} wants a key", f"write {example} into the table [printers] of the settings file; {where}"
-    )
-
-
 def require_good(answer: Answer, what: str) -> None:
     """Refuse an answer that is an error.
 
@@ -218,3 +196,59 @@ def note_refusal(answer: Answer, what: str) -> None:
     """Log an answer that is an error."""
     if not answer.is_good:
         _log.warning("print refused=%s status=%d words=%r", what, answer.status, answer.words)
+
+
+class KeyedServer:
+    """What all servers have in common: they are asked with a key.
+
+    Attributes:
+        title: see PrintServer.
+
+    Args:
+        uri: where it is.
+        key: for it; empty: none.
+        where: the server shows its key.
+    """
+
+    def __init__(self, uri: ServerUri, key: str, where: str) -> None:
+        self._talk, self._key, self._where = ServerTalk(uri), key, where
+        self._example = f'"{uri.text}" = "KEY"'
+        self.title = self._talk.server
+
+    def hurry(self) -> None:
+        """See PrintServer."""
+        self._talk.hurry()
+
+    def _headers(self) -> dict[str, str]:
+        return {"X-Api-Key": self._key} if self._key else {}
+
+    def _accepted(self, answer: Answer) -> Answer:
+        """Return an answer that wants no other key.
+
+        Raises:
+            SettingsError: it does.
+        """
+        if answer.status not in {401, 403}:
+            return answer
+        if self._key:
+            raise SettingsError(
+                f"{answer.server} does not take the key of the settings file", f"copy it again: {self._where}"
+            )
+        raise SettingsError(
+            f"{answer.server} wants a key",
+            f"write {self._example} into the table [printers] of the settings file; {self._where}",
+        )
+
+    def _asked(self, target: str) -> Answer:
+        return self._accepted(self._talk.ask("GET", target, self._headers()))
+
+    def _ordered(self, target: str, command: Mapping[str, object]) -> Answer:
+        headers = {**self._headers(), "Content-Type": "application/json"}
+        return self._accepted(self._talk.ask("POST", target, headers, json.dumps(command).encode(), ORDER_S))
+
+    def _given(self, target: str, form: Form, gcode: Path, sent: Callable[[float], None]) -> Answer:
+        """Hand a file over in a form; see `PrintServer.start`."""
+        headers = {**self._headers(), "Content-Type": form.content_type}
+        answer = self._talk.hand_over("POST", target, headers, form.body(gcode, sent), form.size(gcode))
+        require_good(self._accepted(answer), "the file")
+        return answer

@@ -3,7 +3,6 @@
 The server prints by itself: when this program ends, the print goes on. When the server is silent, it is asked again for a minute.
 """
 
-import math
 import re
 import threading
 from collections.abc import Callable
@@ -12,10 +11,9 @@ from typing import Final
 
 from common import now
 from common.errors import TandemError, UnavailableError
-from phone_host.printers.door import Job, Wishes
-from phone_host.printers.host_commands import passed_note
+from phone_host.printers.door import Ended, Job, Phase, Progress, Wishes
+from phone_host.printers.gcode import passed_note
 from phone_host.printers.line import PrinterGoneError
-from phone_host.printers.progress import Ended, Heat, Phase, Progress
 from phone_host.printers.server import Condition, PrintServer, ServerState
 from phone_host.printers.server_talk import LEAVING_S, ServerLostError
 
@@ -130,7 +128,7 @@ class _Watch:
         self._server, self._job, self._wishes, self._tell_user, self._patience = server, job, wishes, tell, patience
         self._began_ns = self._heard_ns = now.monotonic_ns()
         self._was_active = self._is_paused = False
-        self._last = ServerState(condition=Condition.READY, share=0.0, seconds_left=math.nan, heat=Heat(), is_hot=False)
+        self._last = ServerState(condition=Condition.READY)
 
     def until_over(self) -> Ended:
         """Return how it ended."""

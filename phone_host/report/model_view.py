@@ -16,8 +16,7 @@ from common.words import two_digits
 from phone_host.output.axes import Axes
 from phone_host.report.depth_data import text_of
 from phone_host.report.depth_view import THIN
-from phone_host.scan.mesh import Mesh
-from phone_host.scan.mesh_parts import thinned
+from phone_host.scan.mesh import Mesh, thinned
 
 MOST_TRIANGLES: Final = 150_000
 """Of a mesh in a page: some 4 MB of text."""

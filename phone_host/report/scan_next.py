@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from common.program.invocation import command_line
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_report import ScanReport
 

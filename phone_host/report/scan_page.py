@@ -9,7 +9,7 @@ import numpy as np
 
 from common.imagesize.head import size_text
 from common.words import counted, distance_text, two_digits
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.model_view import ShownModel, model_view
 from phone_host.report.page_frame import document, section, table, two_widths

@@ -13,14 +13,13 @@ import numpy as np
 
 from common.diagnostic import Diagnostic
 from common.words import counted, two_digits
-from phone_host.model import StereoGeometry
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import StereoGeometry, UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.report_page import Headline
 from phone_host.report.stereo_report import ALWAYS, FailedPair, Size
 from phone_host.scan.mat import Mat
 from phone_host.scan.mat_pose import MatSaid
-from phone_host.scan.mesh_parts import NO_SIZE, MeshSize
+from phone_host.scan.mesh import NO_SIZE, MeshSize
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.tracking_words import OF_TABLE, OF_TURNING, Tracking, Weakness

@@ -9,7 +9,7 @@ from common.errors import AbsentBoardError, SettingsError
 from common.protocol.message import CameraDescription, Pacing
 from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.ledgerer import Ledgerer
-from phone_host.run.worker import Worker
+from phone_host.run.pipeline import Worker
 from phone_host.stream.await_board import BoardPatience, refusal_error
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.refusals import BoardRefusal

@@ -18,8 +18,7 @@ from common.words import counted
 from phone_host.diagnostics.codes import BLOCKING
 from phone_host.model import Processed
 from phone_host.report.stereo_report import FailedPair, Size
-from phone_host.run.freed_memory import keep_freed_memory
-from phone_host.run.kept import partial_words, tell_if_heard
+from phone_host.run.kept import keep_freed_memory, partial_words, tell_if_heard
 from phone_host.run.stereo_remarks import judge_pair
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px

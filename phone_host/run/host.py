@@ -21,20 +21,17 @@ from phone_host.recording.clock_messages import boot_of
 from phone_host.recording.playback import Playback
 from phone_host.recording.switch import RecordingSwitch
 from phone_host.run.course import Course
-from phone_host.run.drift_keeper import DriftKeeper
 from phone_host.run.file_sink import FileSink
-from phone_host.run.freed_memory import keep_freed_memory
 from phone_host.run.host_settings import EndReason, HostSettings
+from phone_host.run.kept import keep_freed_memory
 from phone_host.run.ledgerer import Ledgerer
 from phone_host.run.pair_budget import PairBudget
-from phone_host.run.phase_steering import PhaseSteering
-from phone_host.run.pipeline import Pipeline
+from phone_host.run.pipeline import Pipeline, Worker
 from phone_host.run.recording_sinks import RecordingSink
-from phone_host.run.rig_cameras import RigCameras
+from phone_host.run.rig_cameras import PhaseSteering, RigCameras
 from phone_host.run.sinks import MotionSink, Sink
 from phone_host.run.sources import demand_of, paired_streams
-from phone_host.run.trust_sink import PERIOD_NS, DoubtLog, TrustSink
-from phone_host.run.worker import Worker
+from phone_host.run.trust_sink import PERIOD_NS, DoubtLog, DriftKeeper, TrustSink
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stream.refusals import refusal_text

@@ -8,7 +8,7 @@ from pathlib import Path
 from common.imagesize.head import MOST_PIXELS
 from phone_host.model import AS_CALIBRATED, Departure, Side, TimeOffset
 from phone_host.output.axes import Axes
-from phone_host.stereo.budget_ladder import BudgetWanted
+from phone_host.stereo.budget import BudgetWanted
 from phone_host.sync.fifo import FifoSettings
 from phone_host.sync.phase import Whose
 

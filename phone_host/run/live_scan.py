@@ -19,11 +19,10 @@ from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.model import Result, Side
 from phone_host.output.axes import Axes
-from phone_host.run.scan_files import FinishedScan
+from phone_host.run.scan_job import FinishedScan, ScanWork
 from phone_host.run.scan_result import own_axes, unused_mat
-from phone_host.run.scan_work import ScanWork
 from phone_host.run.sinks import FunctionSink
-from phone_host.scan.box import Box
+from phone_host.scan.blocks import Box
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap

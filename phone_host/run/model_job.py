@@ -9,7 +9,7 @@ from typing import Final
 
 from common.errors import DataError, SettingsError, TandemError
 from phone_host.geometry.unseen_surface import apply_unseen, unseen_share
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 from phone_host.output.atomic import replacing
 from phone_host.output.data_folder import data_folder
 from phone_host.output.meshes.decimated import NoLibraryError, decimated
@@ -19,13 +19,12 @@ from phone_host.output.meshes.solid import Solid, used_points
 from phone_host.output.model_file import Model, read_model
 from phone_host.output.upright import upright_model
 from phone_host.printers.bed import Bed
-from phone_host.printers.door import Job, Wishes
+from phone_host.printers.door import Ended, Job, Progress, Wishes
 from phone_host.printers.doors import configured_door, door_to
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, job_of, require_input
 from phone_host.printers.printer_uri import FileUri, read_uri
 from phone_host.printers.printing import Place, RunningPrint, watched
-from phone_host.printers.progress import Ended, Progress
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.report.scan_report import unseen_sentence
 from phone_host.settings import printer_keys

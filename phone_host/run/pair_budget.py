@@ -13,8 +13,7 @@ from common import now
 from common.errors import TandemError
 from common.program.logs import event
 from phone_host.model import BudgetAccount, BudgetChange, BudgetReason, BudgetStep, StereoGeometry
-from phone_host.stereo.budget import BudgetController
-from phone_host.stereo.budget_ladder import BudgetWanted, Choice, Step, ladder
+from phone_host.stereo.budget import BudgetController, BudgetWanted, Choice, Step, ladder
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import BEST_FIRST, AnyMatcher

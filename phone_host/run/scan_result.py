@@ -11,13 +11,13 @@ import numpy as np
 from common.diagnostic import Diagnostic, Severity
 from common.errors import DataError
 from common.words import counted, distance_text, two_digits
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import ModelFigures, ScanReport
 from phone_host.report.stereo_report import FailedPair
 from phone_host.scan.field_bytes import field_bytes
 from phone_host.scan.full_turn import LEAST_VIEWS, FullTurn
-from phone_host.scan.mesh_parts import size_of
+from phone_host.scan.mesh import size_of
 from phone_host.scan.scan import Scan
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted

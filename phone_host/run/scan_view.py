@@ -14,7 +14,7 @@ from rich.text import Text
 from common import now
 from phone_host.geometry.se3 import rotations_of
 from phone_host.run.live_scan import LiveScan
-from phone_host.run.redrawn import Part, Redrawn
+from phone_host.run.terminal_view import Part, Redrawn
 from phone_host.scan.mesh import Mesh
 from phone_host.scan.patches import Patch
 

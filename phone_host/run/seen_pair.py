@@ -14,12 +14,19 @@ from phone_host.report.stereo_report import Size
 from phone_host.run.file_pairs import Matching, Watcher, sound_pair
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import size_px
-from phone_host.stereo.measured_point import MeasuredPoint, measured_point
+from phone_host.stereo.measured_point import (
+    Known,
+    MeasuredPoint,
+    RigErrors,
+    Wide,
+    ZeroError,
+    measured_point,
+    rig_errors,
+    why_wide,
+)
 from phone_host.stereo.point_match import PointMatch, match_point
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_points
-from phone_host.stereo.rig_errors import Known, RigErrors, ZeroError, rig_errors
-from phone_host.stereo.wide_limits import Wide, why_wide
 
 ELSEWHERE: Final = "choose a point on a surface with texture, away from its edges and not too far"
 """What helps a point that cannot be measured."""

@@ -53,6 +53,9 @@ class Sink(Protocol):
 class SinkQueue(Generic[T]):
     """A bounded queue and the thread that empties it.
 
+    Attributes:
+        failure: the error that `take` raised. From then on everything is dropped.
+
     Args:
         name: its name in report.json.
         take: called with each item in the queue's thread. After any exception but NotWrittenError the queue stops.
@@ -76,7 +79,7 @@ class SinkQueue(Generic[T]):
         self._finishing = False
         self._written = self._dropped = self._failed = 0
         self._delay = Series()
-        self._failure: Exception | None = None
+        self.failure: Exception | None = None
         self._thread = threading.Thread(target=self._run, name=f"sink {name}", daemon=True)
         self._started = False
 
@@ -84,7 +87,7 @@ class SinkQueue(Generic[T]):
         """Wait until there is a place, if this queue waits. With a single thread that offers, the place stays free."""
         if self._waits:
             with self._changed:
-                self._changed.wait_for(lambda: len(self._items) < self._depth or self._failure is not None)
+                self._changed.wait_for(lambda: len(self._items) < self._depth or self.failure is not None)
 
     def offer(self, item: T) -> bool:
         """Take an item. Never waits.
@@ -93,7 +96,7 @@ class SinkQueue(Generic[T]):
             Whether the item was taken. If not, it was dropped and counted.
         """
         with self._changed:
-            if len(self._items) >= self._depth or self._failure is not None or self._finishing:
+            if len(self._items) >= self._depth or self.failure is not None or self._finishing:
                 self._dropped += 1
                 return False
             self._items.append((item, self._clock()))
@@ -110,11 +113,6 @@ class SinkQueue(Generic[T]):
             self._changed.notify_all()
         if self._started:
             self._thread.join()
-
-    @property
-    def failure(self) -> Exception | None:
-        """The error that `take` raised. From then on everything is dropped."""
-        return self._failure
 
     @property
     def account(self) -> SinkAccount:
@@ -141,7 +139,7 @@ class SinkQueue(Generic[T]):
                 has_failed = True
             except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
                 with self._changed:
-                    self._failure = error
+                    self.failure = error
                     self._dropped += len(self._items)
                     self._items.clear()
                     self._changed.notify_all()

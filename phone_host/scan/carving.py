@@ -16,7 +16,7 @@ from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
 from phone_host.native.library import Library, native
 from phone_host.native.volume_jobs import CarveJob
-from phone_host.scan.box import Cells
+from phone_host.scan.blocks import Cells
 from phone_host.scan.view import View
 from phone_host.scan.volume import aim, rows_of
 
@@ -85,7 +85,7 @@ class Carving:
             threads=self._threads,
         )
         aim(job, view.geometry, depth.shape)
-        self._library.carve(job)
+        self._library.run(job)
 
     def take_empty(self, cells: NDArray[np.bool_]) -> None:
         """Take cells (Z, Y, X) for empty, whatever the views have seen of them."""

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from common.errors import DataError
-from phone_host.scan.blocks import VOXELS
-from phone_host.scan.box import Cells
+from phone_host.scan.blocks import VOXELS, Cells
 from phone_host.scan.carving import Carved
 from phone_host.scan.volume import BlockValues, Volume
 from phone_host.scan.volume_settings import VolumeSettings

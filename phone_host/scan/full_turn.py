@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.native.library import Library, native
 from phone_host.scan.camera_pose import Observer
-from phone_host.scan.circle_bundle import Circle, Seen, TurnAxis, axis_of, fitted_circle, misfits, unwrapped
-from phone_host.scan.circle_tracks import tracks_of
+from phone_host.scan.circle_bundle import Circle, Seen, TurnAxis, axis_of, fitted_circle, misfits, tracks_of, unwrapped
 from phone_host.scan.registration import RegistrationSettings, registered
 from phone_host.scan.view import Camera, View
 from phone_host.scan.volume import Volume

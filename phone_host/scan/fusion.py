@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.scan.box import Cells
+from phone_host.scan.blocks import Cells
 from phone_host.scan.carving import Carved, Carving
 from phone_host.scan.surface_error import FusedDepths, Texture, texture_of
 from phone_host.scan.view import View, narrowed

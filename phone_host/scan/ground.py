@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.blocks import ONE, SIDE, Blocks
-from phone_host.scan.box import Cells
+from phone_host.scan.blocks import ONE, SIDE, Blocks, Cells
 from phone_host.scan.circle_bundle import TurnAxis
 from phone_host.scan.view import View, points_of
 

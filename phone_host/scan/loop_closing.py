@@ -68,49 +68,43 @@ class KeptViews:
 
     When they are too many, every second one goes, and from then on every second view is kept. When so few were kept that a surface may be seen by none of
     them, none is kept any more.
+
+    Attributes:
+        every: of how many views one is kept now.
+        bytes: what they take.
     """
 
     def __init__(self, most_bytes: int) -> None:
         self._kept: dict[int, _Kept] = {}
-        self._most_bytes, self._bytes = most_bytes, 0
-        self._seen, self._every = 0, 1
+        self._most_bytes, self.bytes = most_bytes, 0
+        self._seen, self.every = 0, 1
 
     @property
     def are_enough(self) -> bool:
         """Whether the field can be built from them."""
-        return self._every <= _MOST_EVERY
-
-    @property
-    def every(self) -> int:
-        """Of how many views one is kept now."""
-        return self._every
+        return self.every <= _MOST_EVERY
 
     @property
     def count(self) -> int:
         """How many there are."""
         return len(self._kept)
 
-    @property
-    def bytes(self) -> int:
-        """What they take."""
-        return self._bytes
-
     def remember(self, number: int, view: View) -> None:
         """Keep a view, or pass over it."""
         self._seen += 1
-        if not self.are_enough or (self._seen - 1) % self._every:
+        if not self.are_enough or (self._seen - 1) % self.every:
             return
         self._kept[number] = _small(view)
-        self._bytes += self._kept[number].bytes
+        self.bytes += self._kept[number].bytes
         self.bound(self._most_bytes)
 
     def bound(self, most_bytes: int) -> None:
         """Let every second one go until the others take no more than so many bytes."""
-        while self._bytes > most_bytes and self._kept:
-            self._every *= 2
+        while self.bytes > most_bytes and self._kept:
+            self.every *= 2
             numbers = list(self._kept)[::2] if self.are_enough else []
             self._kept = {number: self._kept[number] for number in numbers}
-            self._bytes = sum(kept.bytes for kept in self._kept.values())
+            self.bytes = sum(kept.bytes for kept in self._kept.values())
 
     def of(self, numbers: Sequence[int], step: int = 1) -> Iterator[tuple[int, View]]:
         """Give those of some views that are kept, each with its number, as black views with depth and colours; of these every second one with a step of 2, and so on."""

@@ -15,7 +15,7 @@ from phone_host.calibration.target.corners import Board
 from phone_host.calibration.target.marked import Charuco, MarkFamily, marked_corners
 from phone_host.calibration.target.marks_seen import find_marks, squares_of
 from phone_host.model import Image
-from phone_host.scan.box import Box
+from phone_host.scan.blocks import Box
 from phone_host.stereo.images import to_grey
 
 Floats = NDArray[np.float64]
@@ -149,16 +149,15 @@ class MatInView:
 
 
 class MatDetector:
-    """Looks for a printed mat in the first pairs of a scan."""
+    """Looks for a printed mat in the first pairs of a scan.
+
+    Attributes:
+        result: the mat that was found; None: none was.
+    """
 
     def __init__(self) -> None:
         self._pairs = 0
-        self._result: MatInView | None = None
-
-    @property
-    def result(self) -> MatInView | None:
-        """The mat that was found; None: none was."""
-        return self._result
+        self.result: MatInView | None = None
 
     def take(self, left: Image) -> bool:
         """Look for a mat in the next pair, if it is one of those that are searched.
@@ -170,10 +169,10 @@ class MatDetector:
             Whether a mat was found in this pair, and in none before.
         """
         number, self._pairs = self._pairs, self._pairs + 1
-        if self._result is not None or (number >= _FIRST_PAIRS and number & (number - 1)):
+        if self.result is not None or (number >= _FIRST_PAIRS and number & (number - 1)):
             return False
-        self._result = mat_in_view(to_grey(left))
-        return self._result is not None
+        self.result = mat_in_view(to_grey(left))
+        return self.result is not None
 
 
 def mat_in_view(grey: Image) -> MatInView | None:

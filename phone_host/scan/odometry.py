@@ -194,7 +194,11 @@ def _others(held: _Held, found: CameraPose, observer: Observer) -> int:
 
 
 class Odometry:
-    """Follows a camera from view to view."""
+    """Follows a camera from view to view.
+
+    Attributes:
+        offset_px: by how much all disparities are too large, px, as far as the motion tells; 0 at first.
+    """
 
     def __init__(self, settings: OdometrySettings = OdometrySettings()) -> None:
         self._settings = settings
@@ -203,21 +207,16 @@ class Odometry:
         self._pose = SE3.identity()
         self._next_id = 0
         self._shift_px = float("nan")
-        self._offset_px = 0.0
+        self.offset_px = 0.0
         self._window: list[Keyframe] = []
         self._poses: list[tuple[int, SE3]] = []
         self._keyframe_poses: list[SE3] = []
-
-    @property
-    def offset_px(self) -> float:
-        """By how much all disparities are too large, px, as far as the motion tells; 0 at first."""
-        return self._offset_px
 
     def step(self, view: View) -> Moved:
         """Return how the camera has moved to the next view; all views have one size and one geometry."""
         before, last = self._grey, self._pose
         self._grey = view.grey
-        observer = Observer(view.geometry, view.noise_px, self._offset_px)
+        observer = Observer(view.geometry, view.noise_px, self.offset_px)
         if before is None:
             self._keyframe(view, observer)
             return self._told(last, is_known=True, followed_count=0)
@@ -283,12 +282,12 @@ class Odometry:
         if len(self._window) > 1:
             still = _HELD_STILL if len(self._window) == WINDOW else 1
             fit = fitted(self._window, held.ids, held.points_m, observer, still)
-            self._window, self._offset_px = list(fit.keyframes), fit.offset_px
+            self._window, self.offset_px = list(fit.keyframes), fit.offset_px
             self._held = replace(held, points_m=fit.updated(held.ids, held.points_m))
             first = len(self._keyframe_poses) - len(self._window)
             self._keyframe_poses[first:] = [each.camera_world.inverse() for each in self._window]
             self._pose = self._keyframe_poses[-1]
-        self._begin_points(view, replace(observer, offset_px=self._offset_px))
+        self._begin_points(view, replace(observer, offset_px=self.offset_px))
         self._window[-1] = replace(self._window[-1], ids=self._held.ids, observed_px=self._held.observed_px)
         self._note()
 

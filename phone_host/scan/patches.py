@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.scan.blocks import CORNERS, SIDE
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import part_of, thinned
+from phone_host.scan.mesh import Mesh, mesh_of, part_of, thinned
 from phone_host.scan.volume import Volume
 
 SIDE_BLOCKS: Final = 8

@@ -14,11 +14,19 @@ from phone_host.geometry.se3 import SE3
 from phone_host.native.library import Library
 from phone_host.scan.blocks import BLOCK_BYTES
 from phone_host.scan.graph import Loop, chained, connected, without_outliers
-from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import STANDING, Found, FragmentView, Joined, Joining, MapFragment, Piece, PoseGate
 from phone_host.scan.registration import Registered
-from phone_host.scan.relocalisation import Evidence, PoseSupport, Sighting, are_independent, pose_support, sighted
+from phone_host.scan.relocalisation import (
+    Belief,
+    Evidence,
+    PoseSupport,
+    Sighting,
+    UsualStep,
+    are_independent,
+    pose_support,
+    sighted,
+)
 from phone_host.scan.stretches import ModelMotion
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.view import Camera, View, half_view

@@ -1,7 +1,7 @@
 """What tells where each view was taken: the camera's own way, a table under it, or whatever comes next. Pure.
 
 A source takes the views of one scan in order, fuses those that it is sure of into its volume, and says what became of each. There is one class for each
-way to know a pose, and only `factory` knows them all: a printed mat's is in `mat_tracker`, that of an object that turns in `turntable`.
+way to know a pose, and only `scan.scan_for` knows them all: a printed mat's is in `mat_tracker`, that of an object that turns in `turntable`.
 """
 
 import math
@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from common.errors import SettingsError
-from phone_host.scan.box import Box, Cells
+from phone_host.scan.blocks import Box, Cells
 from phone_host.scan.piece import PoseGate
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap

@@ -210,7 +210,7 @@ def summed(
         threads=settings.threads,
     )
     aim(job, settings.geometry, depth_m.shape)
-    library.register(job)
+    library.run(job)
     return np.asarray(sums.sum(axis=0), np.float64)
 
 

@@ -1,6 +1,6 @@
 """Pairs go in one after another, a model comes out. Pure: no files, no clock.
 
-A scan is put together (`factory`) of a `PoseSource`, which tells where each pair was taken and fuses it into its volume, a `Fusion` of what the pairs tell
+`scan_for` puts a scan together of a `PoseSource`, which tells where each pair was taken and fuses it into its volume, a `Fusion` of what the pairs tell
 beside that, and a `Surface`. The world's axes are those of the rectified left camera at the first pair that has depth; with a mat, the mat's; of an object
 on a table, the table's.
 """
@@ -13,17 +13,19 @@ from typing import Final
 from common.errors import SettingsError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, StereoGeometry
-from phone_host.scan.box import Box
+from phone_host.scan.blocks import Box
 from phone_host.scan.carving import Carved
 from phone_host.scan.fusion import Fusion
 from phone_host.scan.mat import MatDetector, MatInView
+from phone_host.scan.mat_tracker import MatPoses
 from phone_host.scan.piece import Joined
-from phone_host.scan.pose_source import PoseSource
+from phone_host.scan.pose_source import PoseSource, TablePoses, VisualPoses
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap, begun_on_table
 from phone_host.scan.stretches import Placed
-from phone_host.scan.surface import Surface
+from phone_host.scan.surface import BoxSurface, Surface, TableSurface
+from phone_host.scan.turntable import TurnSurface, TurntablePoses
 from phone_host.scan.view import require_size, view_of
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings
@@ -47,12 +49,13 @@ class _Closed:
 
 
 class Scan:
-    """Takes pairs and grows a model. `factory.scan_for` puts one together.
+    """Takes pairs and grows a model. `scan_for` puts one together.
 
     Attributes:
         poses: what tells where the pairs were taken.
         geometry: of the pairs since the first that counts.
         size_px: width and height of their rectified images.
+        wanted: what for; with the box that was chosen since.
 
     Args:
         wanted: what for.
@@ -68,7 +71,7 @@ class Scan:
         surface: Surface,
         on_unused_mat: Callable[[MatInView], None],
     ) -> None:
-        self._wanted, self.poses, self._surface = wanted, poses, surface
+        self.wanted, self.poses, self._surface = wanted, poses, surface
         self._fusion = Fusion(wanted.threads)
         self._detector, self._on_unused_mat = MatDetector() if wanted.mat is None else None, on_unused_mat
         self.geometry: StereoGeometry | None = None
@@ -77,11 +80,6 @@ class Scan:
         self._numbers: dict[str, int] = {}  # of the pairs, by name
         self._closed = _Closed()
         self._is_changed = False  # whether submaps that are closed do not hold any more
-
-    @property
-    def wanted(self) -> ScanWanted:
-        """What for; with the box that was chosen since."""
-        return self._wanted
 
     @property
     def pairs(self) -> tuple[ScannedPair, ...]:
@@ -127,7 +125,7 @@ class Scan:
         """
         if self._detector is not None and self._detector.take(processed.pair.left) and self._detector.result:
             self._on_unused_mat(self._detector.result)
-        view = replace(view_of(processed, self._wanted.mat), stamp_s=stamp_s, skew_s=skew_s)
+        view = replace(view_of(processed, self.wanted.mat), stamp_s=stamp_s, skew_s=skew_s)
         number, before = len(self._pairs), self.settings
         if not self.poses.has_size:
             self.geometry, self.size_px = view.geometry, size_px(view.grey)
@@ -167,7 +165,7 @@ class Scan:
         """Note that the field was begun, or has become coarser: closed submaps do not hold any more then, and the box is carved in as coarse cells."""
         if now is None or (before is not None and before.voxel_m == now.voxel_m):
             return
-        self._fusion.carve(self._surface.cells(self._wanted.model_box, now.voxel_m))
+        self._fusion.carve(self._surface.cells(self.wanted.model_box, now.voxel_m))
         self._is_changed = before is not None or now.voxel_m != self.poses.begun_voxel_m
 
     def _joined(self, view: Joined) -> None:
@@ -251,21 +249,21 @@ class Scan:
         Raises:
             SettingsError: that had another box, or a mat where this one has none.
         """
-        if begun_on_table(submaps) != self._wanted.on_table:
+        if begun_on_table(submaps) != self.wanted.on_table:
             raise SettingsError(
-                f"the resumed scan was started {'without' if self._wanted.on_table else 'with'} --object",
+                f"the resumed scan was started {'without' if self.wanted.on_table else 'with'} --object",
                 "give the same options as before, or start a new scan",
             )
         pairs = [pair for each in submaps for pair in each.pairs]
         had_mat = any(pair.mat is not None for pair in pairs)
-        if had_mat != (self._wanted.mat is not None):
+        if had_mat != (self.wanted.mat is not None):
             raise SettingsError(
                 f"the resumed scan had {'a' if had_mat else 'no'} mat",
                 "give the same --mat as before, or start a new scan",
             )
         self.poses.go_on(submaps)
         self.geometry, self.size_px, carved = submaps[0].geometry, submaps[0].size_px, submaps[-1].carved
-        cells = self._surface.cells(self._wanted.model_box, submaps[0].settings.voxel_m)
+        cells = self._surface.cells(self.wanted.model_box, submaps[0].settings.voxel_m)
         if (None if carved is None else carved.cells) != cells:
             raise SettingsError(
                 "the resumed scan had another box",
@@ -284,8 +282,8 @@ class Scan:
         Args:
             box: m; None: everything.
         """
-        self._wanted = replace(self._wanted, box=box)
-        self.poses.crop(self._wanted.model_box)
+        self.wanted = replace(self.wanted, box=box)
+        self.poses.crop(self.wanted.model_box)
 
     def model(self) -> ScanModel:
         """Return the surface so far: with a box the closed one in it, else what was seen; without triangles before any was."""
@@ -293,6 +291,23 @@ class Scan:
         volume = self.volume
         if volume is None:
             return ScanModel.empty()
-        model = self._surface.model(volume, self._fusion, self._wanted.model_box)
+        model = self._surface.model(volume, self._fusion, self.wanted.model_box)
         views = self.poses.fused_views(self._fusion.depths.fused)
         return model if views is None else model.judged(volume, views, self.poses.pose_errors)
+
+
+def scan_for(wanted: ScanWanted, on_unused_mat: Callable[[MatInView], None] = lambda _: None) -> Scan:
+    """Begin a scan: of cameras that move, around anything, a mat or an object on a table, or of an object that turns.
+
+    Args:
+        wanted: what for.
+        on_unused_mat: is called when a printed mat is in view that the scan does not use, before the pair that shows it is taken.
+    """
+    if wanted.turntable:
+        turning = TurntablePoses(wanted)
+        return Scan(wanted, turning, TurnSurface(turning, wanted.onto), on_unused_mat)
+    if wanted.on_table:
+        on_table = TablePoses(wanted)
+        return Scan(wanted, on_table, TableSurface(on_table, wanted.floor), on_unused_mat)
+    poses = VisualPoses(wanted) if wanted.mat is None else MatPoses(wanted, wanted.mat)
+    return Scan(wanted, poses, BoxSurface(wanted.floor), on_unused_mat)

@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.unseen_surface import apply_unseen, filled_from_border, seen_triangles, unseen_share
-from phone_host.model.unseen import UnseenSurface
-from phone_host.scan.blocks import ONE, SIDE, Blocks
-from phone_host.scan.box import Box
+from phone_host.model import UnseenSurface
+from phone_host.scan.blocks import ONE, SIDE, Blocks, Box
 from phone_host.scan.carving import Carving
 from phone_host.scan.closing import Floor, closed
 from phone_host.scan.ground import Ground
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import Flags, only, part_of, pieces_of, without_crumbs, without_loose_bodies
+from phone_host.scan.mesh import Flags, Mesh, mesh_of, only, part_of, pieces_of, without_crumbs, without_loose_bodies
 from phone_host.scan.surface_error import ErrorScope, FusedDepths, PoseErrors, surface_error
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT, WEIGHT_ONE, VolumeSettings

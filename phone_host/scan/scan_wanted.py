@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass, field
 
 from common.errors import SettingsError
-from phone_host.model.unseen import UnseenSurface
-from phone_host.scan.box import Box
+from phone_host.model import UnseenSurface
+from phone_host.scan.blocks import Box
 from phone_host.scan.closing import Floor
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.loop_closing import LoopSettings

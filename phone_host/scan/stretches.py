@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
 from phone_host.scan.graph import Loop, without_outliers
-from phone_host.scan.motion_belief import MotionBound
+from phone_host.scan.relocalisation import MotionBound
 
 _VIEWS: Final = 5
 """Of a stretch: one second at five pairs a second. With ten, every third view of a room's clip had steps of 10 mm between its stretches."""

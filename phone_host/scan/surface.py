@@ -1,6 +1,6 @@
 """How the surface of a scan is made: of all that was seen, closed in a box, or closed around what stands on a table. Pure.
 
-There is one class for each way to make one; that of an object that turns is in `turntable`, and only `factory` knows them all.
+There is one class for each way to make one; that of an object that turns is in `turntable`, and only `scan.scan_for` knows them all.
 """
 
 from typing import Final, Protocol
@@ -8,8 +8,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.scan.blocks import INSIDE, ONE, SIDE, Blocks
-from phone_host.scan.box import Box, Cells
+from phone_host.scan.blocks import INSIDE, ONE, SIDE, Blocks, Box, Cells
 from phone_host.scan.closing import Floor
 from phone_host.scan.fusion import Fusion
 from phone_host.scan.mat import ABOVE_M

@@ -69,7 +69,7 @@ rendered sequences; decision 0140 has them, and others that were only tested."""
 
 _BIAS: Final = MappingProxyType({PoseErrors.DRIFT: 0.3, PoseErrors.INDEPENDENT: 0.2})
 """Error that all views share, by the matcher, which no spread shows, as a share of a depth's noise: 0.15 px of a disparity. On a mat, whose poses are
-independent, both images were laid onto each other again (`exact_depths`): 0.10 px."""
+independent, both images were laid onto each other again (`mat_tracker.with_exact_depths`): 0.10 px."""
 
 _TEXTURE, _MAX_BLURRED = 4.8, 3.0
 """Grey levels a pixel: where an image changes by less, the variance of that error grows in proportion, up to so many times. Not on a mat."""

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, rotations_of, vectors_of
 from phone_host.scan.field_sample import sampled, slopes
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import without_crumbs
+from phone_host.scan.mesh import Mesh, mesh_of, without_crumbs
 from phone_host.scan.volume import Volume
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.box import Box
+from phone_host.scan.blocks import Box
 from phone_host.scan.mat import ABOVE_M
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View, narrowed

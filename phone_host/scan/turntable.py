@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
-from phone_host.scan.box import Box, Cells
+from phone_host.scan.blocks import Box, Cells
 from phone_host.scan.carving import Carving
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.field_sample import merged

@@ -27,10 +27,9 @@ from phone_host.native.volume_jobs import (
     VolumeArrays,
 )
 from phone_host.scan import volume_numpy
-from phone_host.scan.absorbed import absorbed, reached
 from phone_host.scan.blocks import BLOCK_BYTES, ONE, SIDE, VOXELS, Blocks
-from phone_host.scan.exposure import gains_of, multiplied
 from phone_host.scan.view import Camera, Depth, View
+from phone_host.scan.volume_numpy import absorbed, gains_of, multiplied, reached
 from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
 
 _LOOKS_A_BLOCK: Final = 3
@@ -146,7 +145,7 @@ class Volume:
             threads=self._threads,
         )
         aim(job, view.geometry, depth.shape)
-        self._library.fuse(job)
+        self._library.run(job)
         return self._noted(changed)
 
     def changed_blocks(self, *, every: bool = False) -> BlockValues:
@@ -225,7 +224,7 @@ class Volume:
             most_weight=MOST_WEIGHT,
             threads=self._threads,
         )
-        self._library.absorb(job)
+        self._library.run(job)
         self._noted(chosen)
 
     def _added(self, places: NDArray[np.int32]) -> NDArray[np.int64]:
@@ -277,7 +276,7 @@ class Volume:
             threads=self._threads,
         )
         aim(job, camera.geometry, shape)
-        self._library.cast(job)
+        self._library.run(job)
         return Surface(points, normals)
 
     def _farthest_m(self, camera: Camera) -> float:
@@ -316,7 +315,7 @@ class Volume:
             step=self._step_px(camera.geometry),
         )
         aim(job, camera.geometry, camera.shape)
-        self._library.touch(job)
+        self._library.run(job)
         self.blocks.count = arrays.count
         return int(job.missing)
 

@@ -1,26 +1,29 @@
-"""What the native library does with a volume, in numpy: for machines without it, and to judge it. Pure.
+"""What is computed on a volume's blocks in numpy: what the native library does, for machines without it and to judge it; and the gain of a view's colours. Pure.
 
 The operations are those of native/src/volume.c, fuse_kernel.c and cast_kernel.c, float32 in the same order.
+One field is taken into another (absorb.c) at a rigid motion: values are interpolated between the voxels of the one and averaged into the other, each by
+its weight. A field moves as a whole and is never warped.
 """
 
 from dataclasses import dataclass
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.model import StereoGeometry
-from phone_host.scan.blocks import ONE, SIDE, VOXELS, Blocks
+from phone_host.model import Image, StereoGeometry
+from phone_host.scan.blocks import CORNERS, INSIDE, ONE, SIDE, VOXELS, Blocks
 from phone_host.scan.view import Camera, Depth, View
-from phone_host.scan.volume_settings import MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
+from phone_host.scan.volume_settings import LEAST_WEIGHT, MOST_WEIGHT, WEIGHT_ONE, VolumeSettings
 
 Floats = NDArray[np.float32]
 F: Final = np.float32
 
 _SAMPLES: Final = 5
 _AT_ONCE: Final = 64
-"""Blocks that are fused together: they fit the cache."""
+"""Blocks that are computed together: they fit the cache."""
 
 _SEED_TRUNCATIONS: Final = F(1.5)
 _JUMP: Final = F(0.025)
@@ -246,3 +249,117 @@ def _slope(here: Floats, low: Floats, high: Floats) -> Floats:
     after, before = (np.abs(beside[..., 2] - here[..., 2]) <= most for beside in (high, low))
     ways = [high - low, high - here, here - low]
     return np.select([flags[..., np.newaxis] for flags in (both, after, before)], ways, F(np.nan))
+
+
+_STEP_PX: Final = 8
+"""4800 pixels of VGA: their median is known to a thousandth, in a millisecond."""
+
+_LEAST: Final = 200
+_DARK, _BRIGHT = 16, 239
+"""Outside of these a sensor tells no ratio: noise, and what is cut off."""
+
+_MOST: Final = 2.5
+"""More than a stop and a third is not exposure, but another thing."""
+
+
+def gains_of(view: View, world_camera: SE3, blocks: Blocks, voxel_m: float) -> NDArray[np.float64]:
+    """Return (3,) by how much a view's blue, green and red are to be multiplied to be the model's: medians over the pixels that show it; 1 where too few do."""
+    depth = view.depth_m[::_STEP_PX, ::_STEP_PX].astype(np.float64)
+    rows, columns = (_STEP_PX * each for each in np.nonzero(np.isfinite(depth)))
+    z, of = view.depth_m[rows, columns].astype(np.float64), view.geometry
+    points = np.column_stack([(columns - of.cx_px) * z / of.focal_px, (rows - of.cy_px) * z / of.focal_px, z])
+    voxels = np.rint(world_camera.apply(points) / voxel_m).astype(np.int32)
+    numbers, at = blocks.locate(voxels)
+    safe = np.maximum(numbers, 0)
+    known = (numbers >= 0) & (blocks.weights[safe, at] >= LEAST_WEIGHT) & (blocks.field[safe, at] < ONE)
+    model, seen = blocks.colours[safe, at][known].astype(np.float64), view.colours[rows, columns][known]
+    gains = np.ones(3)
+    for channel in range(3):
+        here, there = seen[:, channel], model[:, channel]
+        usable = (here >= _DARK) & (here <= _BRIGHT) & (there >= _DARK) & (there <= _BRIGHT)
+        if usable.sum() >= _LEAST:
+            gains[channel] = np.median(there[usable] / here[usable])
+    return np.asarray(np.clip(gains, 1 / _MOST, _MOST), np.float64)
+
+
+def multiplied(colours: Image, gains: NDArray[np.float64]) -> Image:
+    """Return colours (H, W, 3), multiplied by (3,) gains and cut off at 255."""
+    table = np.clip(np.rint(np.arange(256)[:, np.newaxis] * gains), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.LUT(colours, table[np.newaxis]), np.uint8)
+
+
+Floats64 = NDArray[np.float64]
+
+
+_LOOKS: Final = np.linspace(-0.5, SIDE - 0.5, 6)
+"""Places along an axis of a block, voxels, that tell which blocks it comes to lie in: at most 1.6 voxels apart."""
+
+_NEXT_TO_NOTHING: Final = 1e-4
+"""A corner with so little share may be unknown: a motion that moves nothing leaves everything as it was."""
+
+
+def reached(places: NDArray[np.int32], into_of: SE3, voxel_m: float) -> NDArray[np.int32]:
+    """Return the blocks (M, 3) in which moved blocks (N, 3) come to lie, in rising order."""
+    looks = np.stack(np.meshgrid(_LOOKS, _LOOKS, _LOOKS, indexing="ij"), axis=-1).reshape(-1, 3) @ into_of.R.T
+    found = [np.zeros((0, 3), np.int32)]
+    for first in range(0, len(places), _AT_ONCE):
+        corners = into_of.apply(SIDE * places[first : first + _AT_ONCE].astype(np.float64) * voxel_m) / voxel_m
+        at = np.rint(corners[:, np.newaxis] + looks).astype(np.int32) >> 3
+        found.append(np.unique(at.reshape(-1, 3), axis=0))
+    return np.unique(np.concatenate(found), axis=0)
+
+
+def absorbed(into: Blocks, of: Blocks, chosen: NDArray[np.uint8], rows: Floats64) -> NDArray[np.uint8]:
+    """Average a moved field into blocks.
+
+    Args:
+        into: whose values change.
+        of: the field that moves.
+        chosen: (count,) 1 for each block of `into` that is looked at.
+        rows: (3, 4) takes voxels of `into` to voxels of `of`.
+
+    Returns:
+        (count,) 1 for each block that got something.
+    """
+    changed, numbers = np.zeros_like(chosen), np.flatnonzero(chosen)
+    for first in range(0, len(numbers), _AT_ONCE):
+        some = numbers[first : first + _AT_ONCE]
+        voxels = (SIDE * into.places[some][:, np.newaxis].astype(np.float64) + INSIDE).reshape(-1, 3)
+        at = voxels @ rows[:, :3].T + rows[:, 3]
+        field, weight, tint, tinted, known = _sampled(of, at)
+        changed[some] = known.reshape(len(some), -1).any(axis=1)
+        block, voxel = (each.ravel()[known] for each in np.broadcast_arrays(some[:, np.newaxis], np.arange(SIDE**3)))
+        held, before = into.weights[block, voxel].astype(np.float64), into.field[block, voxel].astype(np.float64)
+        coming, value = np.maximum(np.rint(weight[known]), 1), np.rint(field[known])
+        mean = np.rint((before * held + np.where(value == 0, 1, value) * coming) / (held + coming))
+        into.field[block, voxel] = np.where(mean == 0, 1, mean)
+        into.weights[block, voxel] = np.minimum(held + coming, MOST_WEIGHT)
+        mine, theirs = held * (np.abs(before) < ONE), coming * (tinted[known] > 0)
+        share = tinted[known][:, np.newaxis]  # also next to nothing of a colour is that colour
+        other = tint[known] / np.where(share > 0, share, 1)
+        old, told = into.colours[block, voxel], mine + theirs > 0
+        both = np.where(told, mine + theirs, 1)[:, np.newaxis]
+        mixed = np.rint((old * mine[:, np.newaxis] + other * theirs[:, np.newaxis]) / both)
+        into.colours[block, voxel] = np.where(told[:, np.newaxis], mixed, old)
+    return changed
+
+
+def _sampled(of: Blocks, at: Floats64) -> tuple[Floats64, Floats64, Floats64, Floats64, NDArray[np.bool_]]:
+    """Return what a field holds at places (N, 3), voxels: value, weight, colour (N, 3) and its share, and whether all around is known."""
+    low = np.floor(at).astype(np.int64)
+    share, count = at - low, len(at)
+    field, weight, tint, tinted = np.zeros(count), np.zeros(count), np.zeros((count, 3)), np.zeros(count)
+    known = np.ones(count, np.bool_)
+    for corner in CORNERS:
+        by = np.where(corner, share, 1 - share).prod(axis=1)
+        numbers, inside = of.locate(low + corner)
+        held = np.where(numbers >= 0, of.weights[numbers, inside], 0)
+        known &= (held > 0) | (by < _NEXT_TO_NOTHING)
+        by = np.where(held > 0, by, 0)
+        value = of.field[numbers, inside].astype(np.float64)
+        field += by * value
+        weight += by * held
+        near = by * (np.abs(value) < ONE)  # elsewhere no colour was told
+        tint += near[:, np.newaxis] * of.colours[numbers, inside]
+        tinted += near
+    return field, weight, tint, tinted, known

@@ -24,7 +24,7 @@ from phone_host.discovery.enrolment import PairingCall
 from phone_host.doctor.host_doctor import examine
 from phone_host.jobs.calibrate.view import SnapshotValues
 from phone_host.jobs.run import PreparedRun
-from phone_host.run.freed_memory import give_back_freed_memory
+from phone_host.run.kept import give_back_freed_memory
 from phone_host.serve import check, find
 from phone_host.serve.activities import Activities, Task
 from phone_host.serve.choices import Choices

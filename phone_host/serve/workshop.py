@@ -18,13 +18,12 @@ from phone_host.output.data_folder import data_folder
 from phone_host.output.meshes.formats import FORMATS
 from phone_host.output.meshes.printable import Printer
 from phone_host.printers.bed import parse_bed
-from phone_host.printers.door import Job, PrinterDoor
+from phone_host.printers.door import Ended, Job, Phase, PrinterDoor, Progress
 from phone_host.printers.doors import configured_door
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, job_of
 from phone_host.printers.printer_uri import FileUri, PrinterUri, read_uri
 from phone_host.printers.printing import Place, RunningPrint
-from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.run.model_job import check_model, export_model
 from phone_host.serve.choices import Choices

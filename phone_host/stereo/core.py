@@ -30,7 +30,7 @@ from phone_host.model import (
     StereoGeometry,
 )
 from phone_host.native.library import native
-from phone_host.stereo.budget_ladder import Choice, Extent
+from phone_host.stereo.budget import Choice, Extent
 from phone_host.stereo.depth_limits import (
     DepthWanted,
     above_zero,
@@ -40,23 +40,23 @@ from phone_host.stereo.depth_limits import (
 )
 from phone_host.stereo.images import WHOLE, require_same_size, size_px
 from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.match_told import without_untold
+from phone_host.stereo.match_tandem import without_untold
 from phone_host.stereo.matcher_names import FASTEST
 from phone_host.stereo.matcher_protocol import Matcher, matched_by
-from phone_host.stereo.points import points_of
 from phone_host.stereo.rectifier import Rectifier
-from phone_host.stereo.reproject import disparities_for_near
+from phone_host.stereo.reproject import disparities_for_near, points_of
 from phone_host.stereo.scaled_rig import scaled_rig
-from phone_host.stereo.stacked import lying_pair, upright_again
 from phone_host.stereo.working import (
     MARGIN_PX,
     Part,
     chosen_scale,
     confidence_of_known,
     confidence_to_full_size,
+    lying_pair,
     part_for,
     reduced,
     to_full_size,
+    upright_again,
 )
 
 _Sizes = tuple[tuple[int, int], tuple[int, int]]

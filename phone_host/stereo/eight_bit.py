@@ -1,13 +1,36 @@
-"""Brings images of any depth to 8 bit. Both images of a pair get the same scale, or the matcher would see two brightnesses."""
+"""Brings images of any depth to 8 bit, and turns them upright: the board sends them as its camera gives them. Both images of a pair get the same scale, or the matcher would see two brightnesses."""
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.model import Image
+
+_TURNS: Final = {90: cv2.ROTATE_90_CLOCKWISE, 180: cv2.ROTATE_180, 270: cv2.ROTATE_90_COUNTERCLOCKWISE}
+_FLIPS: Final = {Flip.H: 1, Flip.V: 0}
+
+
+def upright(image: Image, orientation: Orientation) -> Image:
+    """Turn, then mirror, a decoded image.
+
+    Args:
+        image: (H, W) or (H, W, 3), uint8, as the camera gave it.
+        orientation: how its camera is mounted.
+
+    Returns:
+        The upright image; the image itself if there is nothing to do.
+    """
+    if orientation == UPRIGHT:
+        return image
+    turned = cv2.rotate(image, _TURNS[orientation.rotate_deg]) if orientation.rotate_deg else image
+    flipped = cv2.flip(turned, _FLIPS[orientation.flip]) if orientation.flip is not Flip.NONE else turned
+    return np.asarray(flipped, np.uint8)
+
 
 AnyImage = NDArray[Any]
 """(H, W) or (H, W, 3) BGR, any depth."""

@@ -12,18 +12,92 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import Disparity, Evidence, Image, OffMiddle, Processed, Search
+from phone_host.model import Disparity, Evidence, Exposure, Image, OffMiddle, Processed, Search
 from phone_host.stereo import filters
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.departure import corrected_rectification, corrected_rig
+from phone_host.stereo.depth_limits import is_off_the_middle
 from phone_host.stereo.evidence_features import Matches, find_features, match, on_common_rows, supports
-from phone_host.stereo.evidence_light import measure_exposure
 from phone_host.stereo.evidence_points import PointMaps, ThroughRig, Unmoved
-from phone_host.stereo.evidence_sample import sampled_places
-from phone_host.stereo.evidence_search import ambiguity, measure_fit
-from phone_host.stereo.evidence_track import reduced_grey, tracked
-from phone_host.stereo.plausible import is_off_the_middle
-from phone_host.stereo.stacked import lying, lying_pair
+from phone_host.stereo.evidence_search import ambiguity, measure_fit, sampled_places
+from phone_host.stereo.evidence_track import tracked
+from phone_host.stereo.images import to_grey
+from phone_host.stereo.rectifier import corrected_rectification, corrected_rig
+from phone_host.stereo.working import lying, lying_pair, reduced
+
+_TINY_PX: Final = 80
+"""Width at which structure is measured: each pixel is then the mean of many, and noise is gone."""
+
+_SMOOTH_PX: Final = 4.0
+"""Vignetting and glow through a finger are wider than this at that width, and no structure."""
+
+_SHARP_WIDTH_PX: Final = 640
+_REACH_PX: Final = 5
+_EDGES: Final = 20
+"""Fewer edges than this say nothing about focus."""
+
+_LEAST_RISE: Final = 12.0
+_SURE_RISE: Final = 24.0
+_RISE_SHARE: Final = 0.3
+"""Grey levels over which an edge must rise: far above a webcam's noise, which is 3 levels after averaging along the edge.
+In images of little contrast a share of their range is enough."""
+
+_SHARPEST: Final = 20
+"""Percentile of the edges' widths. Edges of shadows and round bodies are wide in the sharpest image."""
+
+
+def measure_exposure(image: Image, features: int) -> Exposure:
+    """Measure what an image holds.
+
+    Args:
+        image: (H, W) uint8 grey, whole.
+        features: number of features found in it.
+    """
+    height, width = image.shape
+    tiny_px = (_TINY_PX, max(8, round(_TINY_PX * height / width)))
+    tiny = np.asarray(cv2.resize(image, tiny_px, interpolation=cv2.INTER_AREA), np.float32)
+    detail = np.abs(tiny - cv2.GaussianBlur(tiny, (0, 0), _SMOOTH_PX))
+    return Exposure(
+        mean_level=float(tiny.mean()),
+        bright_level=float(np.percentile(tiny, 98)),
+        structure=float(np.percentile(detail, 90)),
+        blur_px=_edge_width_px(image),
+        features=features,
+    )
+
+
+def _edge_width_px(image: Image) -> float:
+    """Measure the width of the sharpest edges: how far brightness would need to rise to its full height at its steepest slope.
+
+    Returns:
+        Standard deviation of the blur that makes such an edge, px of an image at most 640 px wide; NaN with too few edges.
+    """
+    width = image.shape[1]
+    scale = _SHARP_WIDTH_PX / width
+    if scale < 1:
+        image = np.asarray(cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
+    widths = np.concatenate([_widths(image), _widths(np.ascontiguousarray(image.T))])
+    if len(widths) < _EDGES:
+        return float("nan")
+    return float(np.percentile(widths, _SHARPEST))
+
+
+def _widths(image: Image) -> NDArray[np.float32]:
+    """Return the widths of the edges that cross the rows, px."""
+    if min(image.shape) < 2 * _REACH_PX + 1:
+        return np.zeros(0, np.float32)
+    # Along the edge only. Neighbouring rows hold the same edges: every second one is enough.
+    smooth = cv2.blur(image, (1, 3))[::2].astype(np.int16)
+    slope = np.abs(smooth[:, 2:] - smooth[:, :-2]).astype(np.float32) / 2
+    window = np.ones((1, 2 * _REACH_PX + 1), np.uint8)
+    inner = smooth[:, 1:-1]
+    rise = (cv2.dilate(inner, window) - cv2.erode(inner, window)).astype(np.float32)
+    steepest = cv2.dilate(slope, window)
+    low, high = (float(level) for level in np.percentile(smooth[::2, ::4], (2, 98)))
+    least = max(_LEAST_RISE, min(_SURE_RISE, _RISE_SHARE * (high - low)))
+    edges = (slope >= steepest) & (rise >= least) & (slope > 0)
+    # A step blurred by sigma rises by height / (sigma * sqrt(2 pi)) a pixel at its steepest.
+    return np.asarray(rise[edges] / slope[edges] / np.float32(np.sqrt(2 * np.pi)), np.float32)
+
 
 _FEATURE_PX: Final = 48_000
 """Pixels of the images in which features are searched, some 253 x 190: more take longer and find no more mistakes."""
@@ -104,11 +178,6 @@ class Examined:
     matches: Matches
 
 
-def measure_evidence(processed: Processed, maps: PointMaps | None) -> Evidence:
-    """Measure the evidence in one pair; see `look_at`."""
-    return look_at(processed, maps).evidence
-
-
 def look_at(processed: Processed, maps: PointMaps | None) -> Examined:
     """Measure the evidence in one pair.
 
@@ -119,7 +188,7 @@ def look_at(processed: Processed, maps: PointMaps | None) -> Examined:
             and sharpness are measured.
     """
     pair, disparity, epipolar = lying_pair(processed.pair), processed.disparity, processed.pair.epipolar
-    left, right = grey(pair.left), grey(pair.right)
+    left, right = to_grey(pair.left), to_grey(pair.right)
     if maps is None or disparity is None:
         blind = Evidence(left=measure_exposure(left, 0), right=measure_exposure(right, 0))
         return Examined(blind, left, right, Matches(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, np.float32)))
@@ -130,7 +199,7 @@ def look_at(processed: Processed, maps: PointMaps | None) -> Examined:
         # Points then take the way of images that came rectified: a turned camera's axis is taken for the image's middle.
         disparity, maps = lying(disparity, epipolar), Unmoved(width_px, height_px)
     scale = min(1.0, math.sqrt(_FEATURE_PX / left.size))
-    found = [find_features(_stretched(reduced_grey(image, scale)), scale) for image in (left, right)]
+    found = [find_features(_stretched(reduced(image, scale)), scale) for image in (left, right)]
     plain, turned_over = (match(*found, is_mirrored=mirror) for mirror in (False, True))
     upright = tracked(left, right, plain.turned_by(0))
     vertical_px, offset_px = _vertical(upright, height_px)
@@ -153,8 +222,8 @@ def look_at(processed: Processed, maps: PointMaps | None) -> Examined:
         enough_from_m=fit.enough_from_m,
         skew_px=fit.skew_px,
         ambiguous_share=ambiguity(
-            reduced_grey(left, check),
-            reduced_grey(right, check),
+            reduced(left, check),
+            reduced(right, check),
             disparity,
             (processed.search or Search()).disparities,
             check,
@@ -216,11 +285,6 @@ def _middle(disparity: Disparity) -> float:
     return float(np.median(known)) if known.size else math.nan
 
 
-def grey(image: Image) -> Image:
-    """Return an image in grey, (H, W) uint8."""
-    return image if image.ndim == 2 else np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
-
-
 def _stretched(image: Image) -> Image:
     """Stretch the levels to the full range, or SIFT finds nothing in a dim image."""
     low, high = (float(level) for level in np.percentile(image, (1, 99)))
@@ -252,7 +316,7 @@ def _consistency(left: Image, right: Image, disparity: Disparity, offset_px: flo
     """
     width = left.shape[1]
     scale = min(1.0, _CHECK_WIDTH_PX / width)
-    small = reduced_grey(left, scale), reduced_grey(right, scale)
+    small = reduced(left, scale), reduced(right, scale)
     half = _PATCH_PX // 2
     sample = sampled_places(disparity, _CHECKS)
     if not len(sample):

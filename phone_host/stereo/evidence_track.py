@@ -15,6 +15,7 @@ from phone_host.model import Image
 from phone_host.stereo.evidence_features import Matches
 from phone_host.stereo.evidence_points import Points
 from phone_host.stereo.match_align import with_levels_of
+from phone_host.stereo.working import reduced
 
 WIDTH_PX: Final = 1280
 """Wider images are reduced to this."""
@@ -56,8 +57,8 @@ def tracked(left: Image, right: Image, matches: Matches) -> Matches:
     if not len(matches.left_px):
         return matches
     scale = min(1.0, WIDTH_PX / left.shape[1])
-    before = reduced_grey(left, scale)
-    after = with_levels_of(before, reduced_grey(right, scale))  # tracking takes another exposure for motion
+    before = reduced(left, scale)
+    after = with_levels_of(before, reduced(right, scale))  # tracking takes another exposure for motion
     better, kept = _across(before, after, matches.left_px, matches.right_px, scale)
     return Matches(matches.left_px, np.where(kept[:, np.newaxis], better, matches.right_px), matches.turns_deg)
 
@@ -75,23 +76,15 @@ def follow(left: Image, right: Image, matches: Matches, before: Image | None, se
     if not len(matches.left_px):
         return Followed(matches.left_px, matches.right_px, np.zeros((0, 2)))
     scale = min(1.0, WIDTH_PX / left.shape[1])
-    here = reduced_grey(left, scale)
-    there = with_levels_of(here, reduced_grey(right, scale))
+    here = reduced(left, scale)
+    there = with_levels_of(here, reduced(right, scale))
     home, found = _across(there, here, matches.right_px, matches.left_px, scale)
     kept = found & (np.abs(home - matches.left_px).max(axis=1) <= _BACK_PX / scale)
     left_px, right_px = matches.left_px[kept], matches.right_px[kept]
     velocity = np.full(left_px.shape, np.nan)
     if before is not None and seconds > 0 and before.shape == left.shape and len(left_px):
-        velocity = _velocity(here, reduced_grey(before, scale), left_px, scale) / seconds
+        velocity = _velocity(here, reduced(before, scale), left_px, scale) / seconds
     return Followed(left_px, right_px, velocity)
-
-
-def reduced_grey(image: Image, scale: float) -> Image:
-    """Average an image down to a share of its size, 0 to 1; the image itself at 1."""
-    if scale >= 1.0:
-        return image
-    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _across(

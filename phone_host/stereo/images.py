@@ -30,8 +30,7 @@ from common.orientation import UPRIGHT, Orientation
 from common.program.logs import event
 from common.program.out_of_memory import is_out_of_memory, noted_if_out_of_memory
 from phone_host.model import Image
-from phone_host.stereo.eight_bit import AnyImage, to_8_bit
-from phone_host.stereo.orient import upright
+from phone_host.stereo.eight_bit import AnyImage, to_8_bit, upright
 from phone_host.stereo.overheard import overhear
 from phone_host.stereo.two_threads import in_two_threads
 
@@ -108,39 +107,13 @@ def decode(payload: bytes | memoryview, name: str = "the image", most_pixels: in
     return decode_file(examine(payload, name, most_pixels))
 
 
-def decode_pair(
-    left: bytes | memoryview,
-    right: bytes | memoryview,
-    left_name: str = "the left image",
-    right_name: str = "the right image",
-    most_pixels: int = MOST_PIXELS,
-) -> tuple[Image, Image]:
-    """Decode the two images of a pair, with one common scale where they are deeper than 8 bit.
-
-    Args:
-        left: encoded bytes of the left image.
-        right: encoded bytes of the right image.
-        left_name: how error messages call the left image.
-        right_name: how error messages call the right image.
-        most_pixels: an image that claims more is refused.
-
-    Returns:
-        Left and right, each (H, W) grey or (H, W, 3) BGR, uint8.
-
-    Raises:
-        ImageSizeError: one of the two claims more pixels than that.
-        SpoiledImageError: one of the two is spoiled or of no known kind.
-    """
-    return decode_files(examine(left, left_name, most_pixels), examine(right, right_name, most_pixels))
-
-
 def decode_file(image: EncodedFile, reduction: int = 1) -> Image:
     """Decode one examined image, like `decode`; smaller like `decode_files`."""
     return _upright(to_8_bit((_decoded(image, reduction),))[0], image)
 
 
 def decode_files(left: EncodedFile, right: EncodedFile, reductions: tuple[int, int] = WHOLE) -> tuple[Image, Image]:
-    """Decode the two examined images of a pair, like `decode_pair`.
+    """Decode the two examined images of a pair, with one common scale where they are deeper than 8 bit.
 
     Args:
         left: the left image.

@@ -29,9 +29,14 @@ from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_onnx import OnnxMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.match_tandem import TandemMatcher
-from phone_host.stereo.matcher_names import MATCHERS, AnyMatcher, MatcherName, RegisteredMatcher, matcher_named
+from phone_host.stereo.matcher_names import (
+    MATCHERS,
+    AnyMatcher,
+    MatcherName,
+    NetworkMatcher,
+    RegisteredMatcher,
+)
 from phone_host.stereo.matcher_protocol import Matcher
-from phone_host.stereo.network_name import NetworkMatcher
 
 _MEND: Final = "mend or uninstall the package that registers it"
 
@@ -85,19 +90,6 @@ def create_matcher(settings: MatchSettings) -> Matcher:
             return OnnxMatcher(settings.matcher, settings.disparities)
         case _:
             assert_never(settings.matcher)
-
-
-def make_matcher(name: str, disparities: int) -> Matcher:
-    """Build a matcher by the name that a user types; see `create_matcher`.
-
-    Args:
-        name: one of ours, or one that an installed package registers.
-        disparities: N >= 1, px: 0 <= d < N is searched.
-
-    Raises:
-        SettingsError: no matcher has that name, or disparities is below 1.
-    """
-    return create_matcher(MatchSettings(matcher_named(name), disparities))
 
 
 class CheckedMatcher:

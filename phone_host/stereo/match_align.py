@@ -2,13 +2,11 @@
 
 A rectified pair is never perfect: exposures differ, and in a rig that was bumped or has warmed up since its calibration
 the right image sits some tenths of a pixel too high or too low. Levels take two numbers for the whole image here (levels
-that change over the image: `match_levels`), the vertical position one. They are measured from the pair itself, without
+that change over the image: `match_differences`), the vertical position one. They are measured from the pair itself, without
 memory, and left alone where the evidence is weak. Larger faults need a new calibration; the matcher cannot fix them.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -50,31 +48,8 @@ SETTLED_PX = 0.1
 """After a first step so small a second one changes nothing that matters: it would be a fifth as large."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Levels:
-    """A linear change of grey levels: gain * level + offset_levels.
-
-    Attributes:
-        gain: above 0.
-        offset_levels: grey levels of 0 .. 255.
-    """
-
-    gain: float = 1.0
-    offset_levels: float = 0.0
-
-    def of(self, image: Image) -> Image:
-        """Return the image with changed levels, (H, W) uint8; the image itself if nothing changes."""
-        if self == UNCHANGED:
-            return image
-        levels = np.arange(256) * self.gain + self.offset_levels
-        return np.asarray(cv2.LUT(image, np.clip(np.rint(levels), 0, 255).astype(np.uint8)), np.uint8)
-
-
-UNCHANGED: Final = Levels()
-
-
-def overall_levels(left: Image, right: Image) -> Levels:
-    """Find the change that gives the right image the left one's mean and standard deviation.
+def with_levels_of(left: Image, right: Image) -> Image:
+    """Give the right image the left one's mean and standard deviation; itself if either image has too little contrast to measure.
 
     Both see nearly the same scene, so a linear change of levels comes from the cameras (exposure, gain, black level).
     Pixels that are black in either image are not measured: rectification paints black what no camera saw.
@@ -82,9 +57,6 @@ def overall_levels(left: Image, right: Image) -> Levels:
     Args:
         left: (H, W) uint8 grey.
         right: the same size.
-
-    Returns:
-        The change; none if either image has too little contrast to measure.
     """
     seen = ((left > 0) & (right > 0)).astype(np.uint8)
     (mean_left, spread_left), (mean_right, spread_right) = (
@@ -92,14 +64,10 @@ def overall_levels(left: Image, right: Image) -> Levels:
         for mean, spread in (cv2.meanStdDev(i, mask=seen) for i in (left, right))
     )
     if min(spread_left, spread_right) < LEAST_CONTRAST:
-        return UNCHANGED
+        return right
     gain = spread_left / spread_right
-    return Levels(gain=gain, offset_levels=mean_left - gain * mean_right)
-
-
-def with_levels_of(left: Image, right: Image) -> Image:
-    """Give the right image the left one's mean and standard deviation; see `overall_levels`."""
-    return overall_levels(left, right).of(right)
+    levels = np.arange(256) * gain + (mean_left - gain * mean_right)
+    return np.asarray(cv2.LUT(right, np.clip(np.rint(levels), 0, 255).astype(np.uint8)), np.uint8)
 
 
 def vertical_offset_px(left: Image, right: Image, disparity: Disparity) -> float:

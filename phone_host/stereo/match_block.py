@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.model import Disparity, Image, RectifiedPair
-from phone_host.stereo.match_input import check_pair, grey
+from phone_host.stereo.matcher_protocol import check_pair, grey
 
 WINDOW_PX = 8
 """Window edge, px: the paper's."""

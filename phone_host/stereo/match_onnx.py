@@ -1,7 +1,7 @@
 """A slot for learned matchers: runs a stereo network from an ONNX file with onnxruntime, on the processor.
 
 The project ships no network. One that is dropped in must take two rectified images and give one disparity for each pixel
-of the left one, in pixels of its input; `network_layout` finds out the rest. Around it:
+of the left one, in pixels of its input; the shapes that its file declares say the rest. Around it:
 
 - An image that fits into the network's size is extended to it at the right and below, by its last column and row, so no
   pixel changes; a larger one is reduced to it, and the disparity enlarged back. A network without a size of its own gets
@@ -11,9 +11,11 @@ of the left one, in pixels of its input; `network_layout` finds out the rest. Ar
   only where the right view's agrees within a pixel, as in the default matcher.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import cv2
 import numpy as np
@@ -22,10 +24,130 @@ from numpy.typing import NDArray
 from common.errors import DataError, SettingsError, UnavailableError
 from phone_host.model import Disparity, Epipolar, Image, RectifiedPair
 from phone_host.stereo.filters import told_rows
-from phone_host.stereo.match_input import check_pair, grey
-from phone_host.stereo.network_layout import Layout, layout_of
-from phone_host.stereo.network_name import Check, Levels, NetworkMatcher, Sign
+from phone_host.stereo.match_sgbm import mirrored
+from phone_host.stereo.matcher_names import Check, Levels, NetworkMatcher, Sign
+from phone_host.stereo.matcher_protocol import check_pair, grey
 from phone_host.stereo.working import to_full_size
+
+ELEMENTS: Final = {"tensor(float)": "float32", "tensor(float16)": "float16", "tensor(uint8)": "uint8"}
+"""ONNX's names of the number types that are understood, and numpy's."""
+
+_GREY, _RGB = 1, 3
+
+
+class Declared(Protocol):
+    """What a network's file says of one of its inputs or outputs."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def type(self) -> str:
+        """The type of its numbers, as `tensor(float)`."""
+
+    @property
+    def shape(self) -> Sequence[int | str | None]:
+        """Its axes; a name or None: the size is free."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a network is fed.
+
+    Attributes:
+        inputs: names of the inputs: the left image's and the right one's, or one that takes both.
+        channels: of one image: 1 grey, 3 red green blue.
+        channels_first: whether the channels come before rows and columns, or after them.
+        height_px: rows that it takes; 0: any.
+        width_px: columns that it takes; 0: any.
+        element: numpy's name of the number type.
+        output: name of the output with the disparity.
+    """
+
+    inputs: tuple[str, ...]
+    channels: int
+    channels_first: bool
+    height_px: int
+    width_px: int
+    element: str
+    output: str
+
+
+def layout_of(name: str, inputs: Sequence[Declared], outputs: Sequence[Declared]) -> Layout:
+    """Read a network's declarations.
+
+    Args:
+        name: of the file, for error messages.
+        inputs: in the file's order; left before right, unless their names say otherwise.
+        outputs: in the file's order.
+
+    Raises:
+        DataError: it does not take two images and give one map in a form that is understood.
+    """
+    if len(inputs) not in {1, 2}:
+        raise DataError(
+            f"{name} takes {len(inputs)} inputs", "give a network that takes two images, or both in one input"
+        )
+    shapes = [tuple(size if isinstance(size, int) and size > 0 else 0 for size in each.shape) for each in inputs]
+    said = " and ".join(_said(each) for each in inputs)
+    remedy = "give a network for images of shape 1 x channels x rows x columns, or with the channels last"
+    if any(len(shape) != 4 or shape[0] > 1 for shape in shapes) or len(set(shapes)) > 1:
+        raise DataError(f"{name} takes {said}", remedy)
+    elements = {ELEMENTS.get(each.type, "") for each in inputs}
+    if len(elements) > 1 or "" in elements:
+        raise DataError(f"{name} takes {said}", "give a network that takes float, float16 or uint8 numbers")
+    images = 2 if len(inputs) == 1 else 1
+    _, first, middle, last = shapes[0]
+    known = {_GREY * images, _RGB * images}
+    if first in known:
+        channels, channels_first, size = first, True, (middle, last)
+    elif last in known:
+        channels, channels_first, size = last, False, (first, middle)
+    else:
+        raise DataError(f"{name} takes {said}", remedy)
+    return Layout(
+        inputs=_left_then_right([each.name for each in inputs]),
+        channels=channels // images,
+        channels_first=channels_first,
+        height_px=size[0],
+        width_px=size[1],
+        element=next(iter(elements)),
+        output=_map_among(name, outputs),
+    )
+
+
+def _left_then_right(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, exchanged if they say that the right image comes first."""
+    if len(names) == 2 and "right" in names[0].lower() and "left" in names[1].lower():
+        return names[1], names[0]
+    return tuple(names)
+
+
+def _map_among(name: str, outputs: Sequence[Declared]) -> str:
+    """The output that may be a map: the one that is called so, else the last, which networks refine longest."""
+    maps = [each for each in outputs if _may_be_map(each)]
+    if not maps:
+        said = " and ".join(_said(each) for each in outputs)
+        raise DataError(f"{name} gives {said}", "give a network whose output is one disparity for each pixel")
+    called = [each for each in maps if "disp" in each.name.lower()]
+    return called[0].name if len(called) == 1 else maps[-1].name
+
+
+def _may_be_map(output: Declared) -> bool:
+    """Whether two axes may be rows and columns and all others are 1 or free."""
+    if output.type not in ELEMENTS:
+        return False
+    long = [size for size in output.shape if isinstance(size, int) and size > 1]
+    # A network that states no shape at all for its output has none here, either; the result's own shape will tell.
+    return len(long) <= 2 and len(output.shape) in {0, 2, 3, 4}
+
+
+def _said(declared: Declared) -> str:
+    """A declaration in words."""
+    axes = " x ".join(str(size) if isinstance(size, int) else "any" for size in declared.shape) or "no axes"
+    return f"{declared.name} ({declared.type} of {axes})"
+
 
 _MULTIPLE_PX: Final = 32
 _AGREEMENT_PX: Final = 1.0
@@ -99,7 +221,7 @@ class OnnxMatcher:
         trusted &= (told_rows(grey(pair.left)) & told_rows(grey(pair.right)))[:, np.newaxis]
         if self._name.check is Check.YES:
             # The right view is the left view of the mirrored and swapped pair.
-            right = self._run(_mirrored(pair.right), _mirrored(pair.left))[:, ::-1]
+            right = self._run(mirrored(pair.right), mirrored(pair.left))[:, ::-1]
             trusted &= _agree(np.where(trusted, found, np.float32(0)), right)
         return np.where(trusted, found, np.float32(np.nan))
 
@@ -183,7 +305,3 @@ def _agree(left: Disparity, right: Disparity) -> NDArray[np.bool_]:
     there = np.clip(np.rint(columns - left), 0, left.shape[1] - 1).astype(np.intp)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.abs(np.take_along_axis(right, there, 1) - left) <= _AGREEMENT_PX, np.bool_)
-
-
-def _mirrored(image: Image) -> Image:
-    return np.asarray(cv2.flip(image, 1), np.uint8)

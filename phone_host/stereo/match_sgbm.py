@@ -2,7 +2,7 @@
 
 docs/decisions/0002-sgbm-tuning.md says what each step gains:
 
-1. the right image gets the left one's levels (match_levels), and is moved vertically if it is measurably too high or low
+1. the right image gets the left one's levels (match_differences), and is moved vertically if it is measurably too high or low
    (match_align); both are measured along a rough match that needs no equal levels (match_differences);
 2. StereoSGBM, 3-way mode, single-pixel cost, once for the left and once for the right view, with OpenCV's own checks
    off; the left border is extended by N pixels, without which the first N columns would get no value;
@@ -18,9 +18,9 @@ import numpy as np
 from common.errors import SettingsError
 from phone_host.model import Disparity, Image, Matched, RectifiedPair
 from phone_host.stereo import filters
-from phone_host.stereo.match_differences import Differences, differences, reduced
-from phone_host.stereo.match_input import check_pair, grey
+from phone_host.stereo.match_differences import differences, reduced
 from phone_host.stereo.match_support import supported, without_doubtful_bridges
+from phone_host.stereo.matcher_protocol import check_pair, grey
 
 COST_STEP, COST_JUMP = 12, 26
 """P1 and P2, the costs of a change of disparity by one and by more, relative to a single pixel's cost of 0 .. 125."""
@@ -106,13 +106,10 @@ class SgbmMatcher:
         """Match one pair and tell what was corrected; see `ReportingMatcher.matched`."""
         check_pair(pair)
         left, right = grey(pair.left), grey(pair.right)
-        found = self._found(left, right)
-        return Matched(disparity=self._disparity(left, found.undone(right)), report=found.report())
-
-    def _found(self, left: Image, right: Image) -> Differences:
-        return differences(
+        found = differences(
             left, right, lambda here, there, factor: filters.to_px(self._compute(self._rough, here, there, factor))
         )
+        return Matched(disparity=self._disparity(left, found.undone(right)), report=found.report())
 
     def _disparity(self, left: Image, right: Image) -> Disparity:
         """Match two images that are aligned."""
@@ -145,7 +142,7 @@ class SgbmMatcher:
         """Match both views; keep what both agree on, within the range, in rows that say something."""
         left_steps = np.asarray(cv2.medianBlur(self._compute(engine, left, right, scale), MEDIAN_PX), np.int16)
         # The right view is the left view of the mirrored and swapped pair.
-        right_steps = self._compute(engine, _mirrored(right), _mirrored(left), scale)[:, ::-1]
+        right_steps = self._compute(engine, mirrored(right), mirrored(left), scale)[:, ::-1]
         trusted = filters.confirmed(left_steps, right_steps, agreement_px)
         trusted &= left_steps <= (self._disparities - 1) * filters.STEPS_PER_PX
         trusted &= (filters.told_rows(left) & filters.told_rows(right))[:, np.newaxis]
@@ -166,5 +163,6 @@ class SgbmMatcher:
         return np.asarray(engine.compute(*padded), np.int16)[:, searched:]
 
 
-def _mirrored(image: Image) -> Image:
+def mirrored(image: Image) -> Image:
+    """Return an image with its columns in the reverse order."""
     return np.asarray(cv2.flip(image, 1), np.uint8)

@@ -41,12 +41,10 @@ class PlaneFit:
     Attributes:
         plane: the plane.
         on_plane: (N,) bool, the others are wrong matches.
-        limit_px: how far from the plane wrong matches begin, px.
     """
 
     plane: DisparityPlane
     on_plane: NDArray[np.bool_]
-    limit_px: float
 
 
 def plane_at(plane: DisparityPlane, x_px: NDArray[np.floating], y_px: NDArray[np.floating]) -> Floats:
@@ -75,7 +73,6 @@ def fit_plane(x_px: Floats, y_px: Floats, disparity_px: Floats, unit_px: float =
     design = np.column_stack([(x_px - middle_x) / size, (y_px - middle_y) / size, np.ones(x_px.size)])
     found = _least_median(design, disparity_px)
     on_plane = np.zeros(x_px.size, np.bool_)
-    limit_px = unit_px
     for _ in range(_ROUNDS):
         away = np.abs(disparity_px - design @ found)
         limit_px = max(_FAR_SIGMAS * _NORMAL * float(np.median(away)), unit_px)
@@ -88,7 +85,7 @@ def fit_plane(x_px: Floats, y_px: Floats, disparity_px: Floats, unit_px: float =
     slope_x, slope_y = float(found[0]) / size, float(found[1]) / size
     at_origin = float(found[2]) - slope_x * middle_x - slope_y * middle_y
     plane = DisparityPlane(slope_x=slope_x, slope_y=slope_y, at_origin_px=at_origin)
-    return PlaneFit(plane=plane, on_plane=on_plane, limit_px=limit_px)
+    return PlaneFit(plane=plane, on_plane=on_plane)
 
 
 def normal_over_distance(plane: DisparityPlane, geometry: StereoGeometry) -> Floats:

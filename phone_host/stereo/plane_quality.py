@@ -137,7 +137,6 @@ def measure_plane(
     errors_m = _depth_m(d[on], geometry) - _depth_m(plane_at(fit.plane, x[on], y[on]), geometry)
     distance_m, true_m, reference = _against(truth, fit.plane, geometry)
     everywhere = off_plane_px(disparity, geometry, fit.plane)
-    depth_here_m = float(np.median(_depth_m(plane_at(fit.plane, x[on], y[on]), geometry)))
     return PlaneQuality(
         seen=_judged(endless=endless, off_plane=off_plane, bend=bend_px / unit_px, scatter=subpixel_px / unit_px),
         roi=_box(counts),
@@ -153,7 +152,6 @@ def measure_plane(
         tilt_deg=tilt_deg(fit.plane, geometry),
         bias_m=distance_m - true_m,
         true_m=true_m,
-        theory_rms_m=depth_here_m**2 * subpixel_px / (geometry.focal_px * geometry.baseline_m),
         tiles=_tiles(everywhere, disparity, geometry, area=area, reference=reference, unit_px=unit_px),
     )
 
@@ -303,5 +301,5 @@ def _nothing(counts: NDArray[np.bool_], area: Crop, known: NDArray[np.bool_], fi
     return PlaneQuality(
         seen=Seen.TOO_FEW, roi=_box(counts), pixels=int(np.count_nonzero(counts)), fill=fill, off_plane=nan, plane=none,
         subpixel_rms_px=nan, rms_m=nan, bend_px=nan, distance_m=nan, perpendicular_m=nan, tilt_deg=nan, bias_m=nan,
-        true_m=nan, theory_rms_m=nan, tiles=tiles,
+        true_m=nan, tiles=tiles,
     )  # fmt: skip

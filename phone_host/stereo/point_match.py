@@ -22,8 +22,7 @@ import cv2
 import numpy as np
 
 from phone_host.model import Disparity, RectifiedPair
-from phone_host.stereo.between_pixels import Floats, Mask
-from phone_host.stereo.point_window import LEAST_PIXELS, STRAYED_PX, PointWindow
+from phone_host.stereo.point_window import LEAST_PIXELS, STRAYED_PX, Floats, Mask, PointWindow
 
 _SAME_SURFACE_PX: Final = 1.5
 """By how much the matcher's disparity may depart from the plane through the point's own surface."""

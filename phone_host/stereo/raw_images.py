@@ -11,6 +11,7 @@ from common.frame import FrameFault, ImageSizeError, PixelFormat, SpoiledImageEr
 from common.imagesize.head import MOST_PIXELS, ImageKind, require_pixels, size_text
 from common.orientation import UPRIGHT, Orientation
 from phone_host.model import Image
+from phone_host.stereo.eight_bit import upright
 from phone_host.stereo.images import (
     WHOLE,
     EncodedFile,
@@ -20,7 +21,6 @@ from phone_host.stereo.images import (
     examine,
     require_same_shape,
 )
-from phone_host.stereo.orient import upright
 
 _KINDS: Final = {PixelFormat.MJPEG: ImageKind.JPEG, PixelFormat.PNG: ImageKind.PNG}
 _LOOK: Final = "check the camera that sends it"

@@ -1,19 +1,110 @@
-"""Remaps the images of a rig as its rectification says: the maps are made once, and each pair goes through them."""
+"""Remaps the images of a rig as its rectification says: the maps are made once, and each pair goes through them.
+
+The native library remaps where it has the form for it, else OpenCV; both give the same bits. A rig may have departed since it was
+calibrated: its right camera has turned or changed its focal length. The left camera, the baseline and so the whole geometry of the
+rectified pair stay; only the right image is seen through other maps. Left images, crops, disparities and metres of pairs before and
+after a correction mean the same.
+"""
 
 from copy import copy
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
 from common.imagesize.head import size_text
+from phone_host.geometry.se3 import rotations_of
 from phone_host.model import AS_CALIBRATED, CameraModel, Departure, Image, Lens, Rectification, RectifiedPair, Rig, Side
-from phone_host.stereo.departure import corrected_rectification, corrected_rig
+from phone_host.native.library import Library, RemapJob, Simd, native
 from phone_host.stereo.images import size_px
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.stereo.remap import Maps, remap
 from phone_host.stereo.two_threads import in_two_threads
+
+Maps = tuple["cv2.typing.MatLike", "cv2.typing.MatLike"]
+"""(H, W, 2) int16 and (H, W) uint16, as `cv2.convertMaps` makes them for CV_16SC2. Only OpenCV's wheels have `cv2.typing`: Termux's and Debian's packages lack it."""
+
+_FASTER = frozenset({Simd.AVX512, Simd.AVX2, Simd.SSE41})
+"""Sets for which the kernel has code of its own: two thirds of OpenCV's time. Elsewhere OpenCV is the faster one."""
+
+_MOST_SIDE_PX = 32767  # places are int16
+
+
+def remap(image: Image, maps: Maps, library: Library | Diagnostic | None = None) -> Image:
+    """Interpolate an image where a map points, to 1/32 px; beyond its edge the edge goes on.
+
+    Args:
+        image: (h, w) grey or (h, w, 3) BGR, uint8.
+        maps: where each pixel of the result lies in the image.
+        library: computes coloured images; None: that of this installation.
+
+    Returns:
+        (H, W) or (H, W, 3) uint8.
+    """
+    library = native() if library is None else library
+    if isinstance(library, Library) and library.simd in _FASTER:
+        return remap_by(library, image, maps)
+    return _by_opencv(image, maps)
+
+
+def remap_by(library: Library, image: Image, maps: Maps) -> Image:
+    """Do the same with the library's kernel on any instruction set; images that it cannot read go to OpenCV."""
+    places, fractions = np.asarray(maps[0]), np.asarray(maps[1])
+    if not _has_its_form(image, places, fractions):
+        return _by_opencv(image, maps)
+    out = np.empty((*fractions.shape, 3), np.uint8)
+    library.run(
+        RemapJob(
+            image=image.ctypes.data,
+            places=places.ctypes.data,
+            fractions=fractions.ctypes.data,
+            out=out.ctypes.data,
+            image_stride=image.strides[0],
+            out_pixels=fractions.size,
+            image_width=image.shape[1],
+            image_height=image.shape[0],
+        )
+    )
+    return out
+
+
+def _by_opencv(image: Image, maps: Maps) -> Image:
+    remapped = cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(remapped, dtype=np.uint8)
+
+
+def _has_its_form(image: Image, places: NDArray[np.generic], fractions: NDArray[np.generic]) -> bool:
+    """Return whether the kernel can read these arrays as they lie in memory."""
+    coloured = image.dtype == np.uint8 and image.ndim == 3 and image.shape[2] == 3 and image.strides[1:] == (3, 1)
+    fits = coloured and 0 < image.shape[0] <= _MOST_SIDE_PX and 0 < image.shape[1] <= _MOST_SIDE_PX
+    packed = places.flags.c_contiguous and fractions.flags.c_contiguous
+    made = places.dtype == np.int16 and fractions.dtype == np.uint16 and places.shape == (*fractions.shape, 2)
+    return fits and packed and made and image.strides[0] >= 0
+
+
+def corrected_rig(rig: Rig, departure: Departure) -> Rig:
+    """Return the rig as it stands now."""
+    if departure == AS_CALIBRATED:
+        return rig
+    turn = rotations_of(np.array(departure.turn_rad))
+    matrix = rig.right.matrix.copy()
+    matrix[(0, 1), (0, 1)] *= departure.focal
+    return replace(
+        rig,
+        right=replace(rig.right, matrix=matrix),
+        R_right_left=turn @ rig.R_right_left,
+        t_right_left_m=turn @ rig.t_right_left_m,
+    )
+
+
+def corrected_rectification(made: Rectification, departure: Departure) -> Rectification:
+    """Return the rectification of the corrected rig: that of the calibrated one but for the right camera's rotation."""
+    if departure == AS_CALIBRATED:
+        return made
+    return replace(made, R_right=made.R_right @ rotations_of(np.array(departure.turn_rad)).T)
+
 
 _MOST_KEPT_PIXELS = 4_000_000  # twice 1920 x 1080: what a live camera sends. The maps take 6 bytes per pixel and side.
 _STRIP_ROWS = 256

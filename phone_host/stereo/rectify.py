@@ -12,7 +12,7 @@ both principal points, so it is wrong for two sizes. Here each camera's field of
   take for texture.
 
 Cameras that stand one above the other are rectified in the same way, with the baseline as the y axis: their epipolar
-lines are columns, as with `cv2.stereoRectify`. Only the matcher turns such images, by a quarter (`stacked`).
+lines are columns, as with `cv2.stereoRectify`. Only the matcher turns such images, by a quarter (`working.lying`).
 
 Source: J.-Y. Bouguet, Camera Calibration Toolbox, 2000; A. Fusiello et al., "A compact algorithm for rectification of stereo
 pairs", 2000; OpenCV's calib3d documentation for P1, P2 and Q.

@@ -30,6 +30,9 @@ class BoardPatience:
 
     Another protocol version is an error at once, because waiting does not help.
 
+    Attributes:
+        refused: why the board refused this host a moment ago; None if it did not, or is there.
+
     Args:
         patience_ns: how long to wait for an absent board; None for ever.
         began_ns: when the wait began, ns.
@@ -40,15 +43,10 @@ class BoardPatience:
     def __init__(self, patience_ns: int | None, began_ns: int, *, where: str = "", remedy: str = _REMEDY) -> None:
         self._patience_ns = patience_ns
         self._seen_ns = began_ns
-        self._refused: BoardRefusal | None = None
+        self.refused: BoardRefusal | None = None
         self._refused_ns = 0
         self._absent = f"no board at {where}" if where else "no board"
         self._remedy = remedy
-
-    @property
-    def refused(self) -> BoardRefusal | None:
-        """Why the board refused this host a moment ago; None if it did not, or is there."""
-        return self._refused
 
     def look(self, now_ns: int, refused: BoardRefusal | None, *, present: bool) -> None:
         """Check whether to wait any longer.
@@ -66,16 +64,16 @@ class BoardPatience:
         if present:
             self._seen_ns = now_ns
         if refused is not None:
-            self._refused, self._refused_ns = refused, now_ns
+            self.refused, self._refused_ns = refused, now_ns
         elif present or now_ns - self._refused_ns > _BUSY_NS:
-            self._refused = None
+            self.refused = None
         patience_ns = self._patience_ns
         if refused is not None:
             patience_ns = max(patience_ns or 0, _BUSY_NS) if refused.reason is RefusalReason.BUSY else 0
         if patience_ns is None or now_ns - self._seen_ns <= patience_ns:
             return
-        if self._refused is not None:
-            raise refusal_error(self._refused)
+        if self.refused is not None:
+            raise refusal_error(self.refused)
         raise AbsentBoardError(f"{self._absent} within {patience_ns / 1e9:g} s", self._remedy)
 
 

@@ -1,13 +1,31 @@
 """Where a board's frames go once the border believes them: into pairs, a recording or a count.
 
+What the reception must know of the links stands here, too.
+
 Only the receiver's thread calls a frame sink. The sink must not make it wait, or the clock's echoes would be late.
 """
 
+from dataclasses import dataclass
 from typing import Protocol
 
-from common.protocol.message import CameraDescription
+from common.protocol.message import CameraDescription, Lane
 from phone_host.model import BoardFrame
 from phone_host.sync.quarantine import Disbelief
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFacts:
+    """What the reception must know of a link.
+
+    Attributes:
+        kind: the transport's name.
+        dialled: the connections that this side opened, with names unique over all links; empty if the board dials.
+        self_paced: whether the link itself holds the next frame back until the previous one has left.
+    """
+
+    kind: str
+    dialled: dict[Lane, bytes]
+    self_paced: bool
 
 
 class FrameSink(Protocol):

@@ -25,10 +25,8 @@ from common.protocol.message import (
 from phone_host.accounts.link_account import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
 from phone_host.stream.border import Arrival, Border
-from phone_host.stream.frame_sink import FrameSink
-from phone_host.stream.link_facts import LinkFacts
-from phone_host.stream.lock_asking import LockAsking
-from phone_host.stream.refusals import BoardRefusal, Refusals, refusal_text
+from phone_host.stream.frame_sink import FrameSink, LinkFacts
+from phone_host.stream.refusals import BoardRefusal, LockAsking, Refusals, refusal_text
 from phone_host.sync.choice import LinkChoice
 from phone_host.sync.clock import ClockEstimate
 from phone_host.sync.flow import Flow
@@ -44,6 +42,7 @@ class Reception:
         tail_known: whether the board has told the last account of this session.
         border: what decides whether frames are believed.
         due_ns: when to call `tick` next even if nothing comes, ns; as of the last `tick`.
+        hello: the board's description of itself; None before the first contact.
 
     Args:
         links: the links' facts, the preferred link first.

@@ -33,7 +33,7 @@ from phone_host.printers.slicing import SlicingWanted
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_lines import scan_lines
 from phone_host.run.progress_bar import announce, busy_bar, progress_bar, step_bar
-from phone_host.run.scan_files import FinishedScan, report_values, write_scan
+from phone_host.run.scan_job import FinishedScan, report_values, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.run.scan_view import ScanPicture
 from phone_host.scene.object_scene import ObjectScene, Setting, object_scene

@@ -10,7 +10,8 @@ from common.program.terminal import say
 from common.words import counted
 from phone_host.jobs.output_folders import require_alone, require_folder, written_together
 from phone_host.jobs.units import length_mm
-from phone_host.model.unseen import UNSEEN_HELP, UnseenSurface
+from phone_host.model import UnseenSurface
+from phone_host.model.quality import UNSEEN_HELP
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_number, json_text
 from phone_host.output.meshes.formats import FORMATS, METRES, WITHOUT_COLOUR, mesh_bytes

@@ -31,8 +31,7 @@ from phone_host.run.seen_pair import (
     measure_points,
     point_text,
 )
-from phone_host.stereo.measured_point import Within, distance_between
-from phone_host.stereo.rig_errors import Known
+from phone_host.stereo.measured_point import Known, Within, distance_between
 
 EXAMPLES = """  phone-host measure left.png right.png --calibration rig.yaml --points 220,220
   phone-host measure left.png right.png --calibration rig.yaml --points 220,220 310,230.5    # and the distance between the two

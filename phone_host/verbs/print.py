@@ -20,14 +20,20 @@ from common.program.signals import StopSignals
 from common.program.terminal import say
 from common.words import counted
 from phone_host.output.json_text import json_text
-from phone_host.printers.announced_printers import SERVICES, FoundPrinter, printers_of
 from phone_host.printers.bed import BED_HELP, Bed, parse_bed
-from phone_host.printers.door import Job, Wishes
+from phone_host.printers.door import Ended, Job, Phase, Progress, Wishes
 from phone_host.printers.journal import Journal
 from phone_host.printers.preparing import Wanted, is_gcode
-from phone_host.printers.printer_uri import FileUri, PrinterUri, ServerUri, read_uri
+from phone_host.printers.printer_uri import (
+    SERVICES,
+    FileUri,
+    FoundPrinter,
+    PrinterUri,
+    ServerUri,
+    printers_of,
+    read_uri,
+)
 from phone_host.printers.printing import RunningPrint, begun, printed
-from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import Slicer, SlicingWanted
 from phone_host.run.model_job import PreparedPrint, prepare_print
 from phone_host.run.progress_bar import busy_bar, share_bar, step_bar

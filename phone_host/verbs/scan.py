@@ -16,8 +16,7 @@ from phone_host.report.scan_lines import scan_lines
 from phone_host.report.scan_next import next_lines
 from phone_host.report.scan_report import ScanReport
 from phone_host.run.host_settings import EndReason
-from phone_host.run.scan_files import NAMES
-from phone_host.run.scan_job import run_scan
+from phone_host.run.scan_job import NAMES, run_scan
 
 if TYPE_CHECKING:
     from phone_host.jobs.scan import PreparedScan

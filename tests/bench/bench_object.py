@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from common import now
 from phone_host.geometry.se3 import SE3, vectors_of
 from phone_host.model import Processed
-from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
+from phone_host.scan.blocks import Box
 from phone_host.scan.mat import USUAL_MAT, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatScale, fit_mat
 from phone_host.scan.mesh import Mesh
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scene.object_scene import ObjectScene, Setting, Size, object_scene

@@ -24,7 +24,7 @@ from rich.progress import track
 from common.ledger import StageTimes
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair, StereoGeometry
-from phone_host.scan.factory import scan_for
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine

@@ -29,9 +29,9 @@ from rich.progress import track
 from common.ledger import StageTimes
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair
-from phone_host.scan.factory import scan_for
 from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.pose_source import VisualPoses
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import PoseOrigin, ScannedPair
 from phone_host.scan.stretches import ClosedLoop

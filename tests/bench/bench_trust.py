@@ -31,7 +31,7 @@ from common import now
 from phone_host.diagnostics.codes import BLOCKING, Code
 from phone_host.diagnostics.image_rules import image_doubts
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import maps_of, measure_evidence
+from phone_host.stereo.evidence import look_at, maps_of
 from tests.bench.depth_scenes import Image
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
@@ -103,7 +103,7 @@ class Row:
 def _judge(core: StereoCore, left: Image, right: Image) -> tuple[frozenset[str], float]:
     processed = core.compute(left, right, now.monotonic_ns)
     began = time.process_time()
-    evidence = measure_evidence(processed, maps_of(core, processed))
+    evidence = look_at(processed, maps_of(core, processed)).evidence
     took_ms = (time.process_time() - began) * 1e3
     return frozenset(concern.code for concern in image_doubts(evidence)), took_ms
 

@@ -11,7 +11,7 @@ import numpy as np
 from phone_host.model import CameraModel, Departure, Rig
 from phone_host.scene.scene_model import Body, Box, Look, Path, Plane, Scene, Sphere, Texture, rig_poses, rotation
 from phone_host.scene.scene_render import Renderer
-from phone_host.stereo.departure import corrected_rig
+from phone_host.stereo.rectifier import corrected_rig
 from tests.bench.depth_scenes import Image
 
 JPEG_QUALITY: Final = 90

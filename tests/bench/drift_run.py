@@ -10,7 +10,7 @@ import cv2
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.scene_model import rig_poses
 from phone_host.scene.scene_render import Renderer
-from phone_host.stereo.departure import corrected_rig
+from phone_host.stereo.rectifier import corrected_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.bench.drift_films import furnished_room, play_rig, turned
 from tests.support.programs import board, host

@@ -19,7 +19,7 @@ from phone_host.scene.scene import demo_scene, matched_rig, rectified_cameras
 from phone_host.scene.scene_model import Look
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.images import decode_pair
+from phone_host.stereo.images import decode_files, examine
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import matcher_named
 from phone_host.stereo.rectifier import Rectifier
@@ -126,7 +126,7 @@ def our_chain(where: Setting, name: str) -> Run:
     core = StereoCore(MatchSettings(matcher_named(name), where.disparities), Rectifier(_rig(where)))
 
     def run() -> object:
-        done = core.compute(*decode_pair(left, right), time.perf_counter_ns)
+        done = core.compute(*decode_files(examine(left, "left"), examine(right, "right")), time.perf_counter_ns)
         assert done.cloud is not None
         return packed_points(done.cloud, done.pair.left)
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from phone_host.geometry.lens import project, rays_through
 from phone_host.model import CameraModel, Rig
-from phone_host.stereo.measured_point import MeasuredPoint, distance_between, measured_point
+from phone_host.stereo.measured_point import MeasuredPoint, distance_between, measured_point, rig_errors
 from phone_host.stereo.point_match import PointMatch
 from phone_host.stereo.rectify import rectify_points, rectify_rig
-from phone_host.stereo.rig_errors import rig_errors
 from tests.bench.drawn_rigs import Floats, drawn_rig, with_covariance
 from tests.bench.measured_rooms import Row, row_of
 from tests.bench.trust_rooms import room

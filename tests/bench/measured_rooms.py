@@ -13,12 +13,11 @@ from phone_host.scene.scene_model import rotation
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.default_matcher import default_matcher
 from phone_host.stereo.match import MatchSettings
-from phone_host.stereo.measured_point import MeasuredPoint, Within, distance_between, measured_point
+from phone_host.stereo.measured_point import MeasuredPoint, Within, distance_between, measured_point, rig_errors
 from phone_host.stereo.point_match import PointMatch, match_point
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_points
 from phone_host.stereo.reproject import disparities_for_near
-from phone_host.stereo.rig_errors import rig_errors
 from tests.bench.drawn_rigs import drawn_rig, with_covariance
 from tests.bench.trust_rooms import Room, room
 

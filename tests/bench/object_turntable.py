@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
-from phone_host.scan.factory import scan_for
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.turntable import TurntablePoses
 from tests.bench.figures import Verdict, exit_code

@@ -13,8 +13,7 @@ import numpy as np
 
 from common import now
 from phone_host.model import Disparity, Processed, RectifiedPair
-from phone_host.scan.factory import scan_for
-from phone_host.scan.scan import Scan
+from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.view import view_of

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import without_crumbs
+from phone_host.scan.mesh import Mesh, mesh_of, without_crumbs
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT, VolumeSettings
 from tests.bench.scan_clips import Clip

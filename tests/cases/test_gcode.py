@@ -12,8 +12,7 @@ import pytest
 
 from common.errors import DataError, SettingsError
 from phone_host.printers.bed import Bed, bed_of_settings, parse_bed, stated_bed
-from phone_host.printers.binary_gcode import text_gcode
-from phone_host.printers.preparing import require_input
+from phone_host.printers.preparing import require_input, text_gcode
 from phone_host.printers.slicing import facts_of, require_inside
 
 FOLDER: Final = Path(__file__).parent / "gcode"

@@ -16,7 +16,7 @@ from phone_host.calibration.target.board_views import BoardViews
 from phone_host.calibration.target.corners import Board, Corners, agree
 from phone_host.calibration.target.pairs import BoardPair
 from phone_host.model import Image, Side
-from phone_host.stereo.orient import upright
+from phone_host.stereo.eight_bit import upright
 from tests.support.boards import BOARD, poses
 from tests.support.rigs import project_points, unlike_rig
 

@@ -28,8 +28,7 @@ from common.protocol.message import (
 from common.protocol.session import Accepted, Arrived, Counted, Refused, Vanished, connection_name
 from common.protocol.wire import decode, encode, encode_for_any_version
 from phone_host.model import BoardFrame
-from phone_host.stream.frame_sink import NoFrames
-from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.frame_sink import LinkFacts, NoFrames
 from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal, refusal_text
 from tests.golden.record import MS, OFFSET_NS, SLOTS, board_ns

@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 
 from common.errors import TandemError
-from phone_host.printers.door import Job, PrinterDoor, Wishes
+from phone_host.printers.door import Job, Phase, PrinterDoor, Progress, Wishes
 from phone_host.printers.doors import door_to
 from phone_host.printers.printer_uri import ServerKind, read_uri
-from phone_host.printers.progress import Phase, Progress
 from phone_host.printers.server_door import ServerPatience
 from phone_host.printers.slicing import facts_of
 from tests.support.marlin_printer import Faults, cube, printer

@@ -25,8 +25,7 @@ from phone_host.model import DepthLimits, StereoGeometry
 from phone_host.native.build_library import LIBRARY_FILE, SOURCES, WARNINGS, build
 from phone_host.native.library import Library, native
 from phone_host.output.ply import packed_points
-from phone_host.stereo.points import points_of, reproject_job
-from phone_host.stereo.reproject import rays
+from phone_host.stereo.reproject import points_of, rays, reproject_job
 from tests.native.match_cases import fixed_cases, result_of
 
 PROGRAM = Path(__file__).resolve().parent / "arm_program"
@@ -98,7 +97,7 @@ def point_cases(library: Library) -> Iterator[Case]:
             columns, rows = rays(geometry, width, height)
             cloud = np.empty((height, width, 3), np.float32)
             job = reproject_job(disparity, (columns, rows), geometry, limits, cloud)
-            library.reproject(job)
+            library.run(job)
             assert cloud.tobytes() == points_of(disparity, geometry, limits, library).cloud.tobytes()
             whole = np.array([width, height, job.wide], "<i4")
             values = np.array([job.doffs_px, job.product, job.least_px, job.at_zero_px, job.far_m, job.near_m], "<f4")

@@ -203,5 +203,5 @@ def result_of(library: Library, case: MatchCase) -> tuple[NDArray[np.float32], B
     )
     workspace = np.full(library.match_bytes(job), 0xA5, np.uint8)  # what an earlier pair left must not matter
     job.workspace, job.workspace_bytes = workspace.ctypes.data, workspace.size
-    library.match(job)
+    library.run(job)
     return disparity, confidence

@@ -11,7 +11,7 @@ from phone_host.model import DepthLimits, Disparity, StereoGeometry
 from phone_host.native.library import Library
 from phone_host.output.axes import Axes
 from phone_host.output.ply import packed_points
-from phone_host.stereo.points import Points, points_of
+from phone_host.stereo.reproject import Points, points_of
 
 NONE = Diagnostic(message="left out by this test", remedy="none")
 VALUES = st.one_of(

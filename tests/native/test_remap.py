@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from common.diagnostic import Diagnostic
 from phone_host.model import Image
 from phone_host.native.library import Library
-from phone_host.stereo.remap import Maps, remap, remap_by
+from phone_host.stereo.rectifier import Maps, remap, remap_by
 
 NONE = Diagnostic(message="left out by this test", remedy="none")
 same_fixture = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80, deadline=None)

@@ -68,7 +68,7 @@ def test_the_sanitizers_are_on(sanitized: dict[str, str]) -> None:
         "from phone_host.native.library import PackJob, load\n"
         f"library = load(Path(os.environ['{FOLDER}']))\n"
         "cloud, colours, records = np.ones((3, 90, 3), np.float32), np.zeros((4, 90), np.uint8), np.empty(15 * 361, np.uint8)\n"
-        "library.pack(PackJob(cloud_m=cloud.ctypes.data, colours=colours.ctypes.data, records=records.ctypes.data,\n"
+        "library.run(PackJob(cloud_m=cloud.ctypes.data, colours=colours.ctypes.data, records=records.ctypes.data,\n"
         "    cloud_stride=270, colour_stride=90, width=90, height=4, channels=1))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], env=sanitized, capture_output=True, text=True, check=False)

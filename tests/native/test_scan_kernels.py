@@ -7,7 +7,7 @@ from common.diagnostic import Diagnostic
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.native.library import Library
-from phone_host.scan.box import Cells
+from phone_host.scan.blocks import Cells
 from phone_host.scan.carving import Carving
 from phone_host.scan.view import Depth, View
 from phone_host.scan.volume import Volume

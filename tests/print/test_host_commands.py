@@ -4,11 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from phone_host.printers.door import Job, Wishes
-from phone_host.printers.gcode import examine
-from phone_host.printers.host_commands import host_command
+from phone_host.printers.door import Ended, Job, Phase, Progress, Wishes
+from phone_host.printers.gcode import examine, host_command
 from phone_host.printers.printer_uri import ServerKind
-from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.sending import LineDoor
 from tests.print.test_print_by_server import with_key
 from tests.print.test_print_verb import done

@@ -11,10 +11,9 @@ from typing import Final
 import pytest
 
 from common.errors import TandemError
-from phone_host.printers.door import Job, Wishes
+from phone_host.printers.door import Ended, Job, Phase, Wishes
 from phone_host.printers.doors import door_to
 from phone_host.printers.printer_uri import read_uri
-from phone_host.printers.progress import Ended, Phase
 from phone_host.printers.slicing import facts_of
 from tests.print.test_print_verb import done, environment
 from tests.support.lying_printer import Answer, LyingPrinter, lying_printer

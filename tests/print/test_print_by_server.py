@@ -14,10 +14,9 @@ from zeroconf import ServiceInfo, Zeroconf
 from common.errors import SettingsError
 from common.program.settings import read_file
 from phone_host.discovery.found import Announcement
-from phone_host.printers.announced_printers import FoundPrinter, printers_of
 from phone_host.printers.doors import key_of
 from phone_host.printers.gcode import examine
-from phone_host.printers.printer_uri import ServerKind, read_uri
+from phone_host.printers.printer_uri import FoundPrinter, ServerKind, printers_of, read_uri
 from phone_host.printers.server_door import name_there
 from tests.print.test_print_verb import command, cube_file, done, environment
 from tests.support.marlin_printer import Faults, cube, printer

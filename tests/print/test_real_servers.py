@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 
 from common.errors import SettingsError, UnavailableError
-from phone_host.printers.door import Job, Wishes
+from phone_host.printers.door import Ended, Job, Phase, Progress, Wishes
 from phone_host.printers.doors import door_to
 from phone_host.printers.printer_uri import read_uri
-from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import facts_of
 from tests.support import real_print_servers as real
 from tests.support.marlin_printer import Faults, cube, printer

@@ -10,13 +10,12 @@ from contextlib import suppress
 import pytest
 
 from common.errors import DataError, UnavailableError
-from phone_host.printers.door import Wishes
+from phone_host.printers.door import Phase, Wishes
 from phone_host.printers.gcode import lines_of
 from phone_host.printers.line import PrinterGoneError, open_line
 from phone_host.printers.marlin import MarlinSender
 from phone_host.printers.marlin_rules import SenderOptions
 from phone_host.printers.printer_uri import LineUri, read_uri
-from phone_host.printers.progress import Phase
 from phone_host.printers.sending import send
 from tests.support.marlin_printer import Faults, MarlinPrinter, cube, printer
 from tests.support.programs import until

@@ -7,12 +7,11 @@ from threading import Timer
 import pytest
 
 from common.errors import SettingsError, TandemError, UnavailableError
-from phone_host.printers.door import Job, Wishes
+from phone_host.printers.door import Ended, Job, Phase, Progress, Wishes
 from phone_host.printers.doors import door_to
 from phone_host.printers.line import PrinterGoneError
 from phone_host.printers.printer_uri import ServerKind, read_uri
 from phone_host.printers.printing import Place, RunningPrint
-from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.server_door import ServerPatience
 from phone_host.printers.slicing import facts_of
 from tests.support.marlin_printer import cube

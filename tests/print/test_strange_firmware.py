@@ -10,10 +10,9 @@ from typing import Final
 import pytest
 
 from common.errors import TandemError
-from phone_host.printers.door import Job, Wishes
+from phone_host.printers.door import Ended, Job, Phase, Progress, Wishes
 from phone_host.printers.doors import door_to
 from phone_host.printers.printer_uri import read_uri
-from phone_host.printers.progress import Ended, Phase, Progress
 from phone_host.printers.slicing import facts_of
 from tests.support.lying_printer import lying_printer
 from tests.support.marlin_printer import cube

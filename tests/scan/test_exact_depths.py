@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from phone_host.model import Epipolar, Image, StereoGeometry
-from phone_host.scan.exact_depths import with_exact_depths
+from phone_host.scan.mat_tracker import with_exact_depths
 from phone_host.scan.view import View
 
 GEOMETRY = StereoGeometry(focal_px=600.0, baseline_m=0.06, cx_px=100.0, cy_px=80.0, doffs_px=3.0)

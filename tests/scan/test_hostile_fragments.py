@@ -15,8 +15,8 @@ from common.diagnostic import Diagnostic
 from common.errors import DataError
 from phone_host.geometry.se3 import SE3
 from phone_host.native.library import Library, native
-from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import Arrays, field_bytes, field_of, packed, unpacked
+from phone_host.scan.scan import scan_for
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.view import Camera
 from phone_host.scan.volume import Volume

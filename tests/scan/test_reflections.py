@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from phone_host.model import StereoGeometry
-from phone_host.scan.exact_depths import without_reflections
+from phone_host.scan.mat_tracker import without_reflections
 from phone_host.scan.view import View
 
 SHAPE = (60, 80)

@@ -10,17 +10,15 @@ import pytest
 from common.errors import DataError
 from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
-from phone_host.scan.box import Box, Cells
+from phone_host.scan.blocks import Box, Cells
 from phone_host.scan.carving import Carving
-from phone_host.scan.cell_field import CellField, cell_field
-from phone_host.scan.circle_bundle import TurnAxis
-from phone_host.scan.circle_tracks import tracks_of
-from phone_host.scan.factory import scan_for
+from phone_host.scan.circle_bundle import TurnAxis, tracks_of
+from phone_host.scan.closing import CellField, cell_field
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.full_turn import TurnView, full_turn
 from phone_host.scan.ground import above, table_height_m
-from phone_host.scan.mesh import Mesh
-from phone_host.scan.mesh_parts import without_loose_bodies
+from phone_host.scan.mesh import Mesh, without_loose_bodies
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.turning_mask import Turning, TurningMask, ball_of

@@ -14,8 +14,7 @@ from phone_host.native.library import Library, native
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.ply import PointCloud, write_surface
-from phone_host.scan.blocks import ONE, VOXELS, Blocks
-from phone_host.scan.box import Box, Cells
+from phone_host.scan.blocks import ONE, VOXELS, Blocks, Box, Cells
 from phone_host.scan.carving import Carving
 from phone_host.scan.closing import Floor, closed
 from phone_host.scan.fusion import KeptDepths

@@ -8,11 +8,10 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.native.library import Library, native
-from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
+from phone_host.scan.blocks import Box
 from phone_host.scan.loop_closing import LoopCloser, LoopSettings
 from phone_host.scan.piece import Piece, PoseGate
-from phone_host.scan.scan import Scan
+from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.stretches import Placed
 from phone_host.scan.submap_bytes import submap_bytes, submap_of

@@ -23,12 +23,11 @@ from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.rig_yaml import write_rig
 from phone_host.report.scan_report import mat_figures
-from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
+from phone_host.scan.blocks import Box
 from phone_host.scan.mat import ABOVE_M, USUAL_MAT, MatCorners, mat_corners, parse_mat
 from phone_host.scan.mat_pose import MatPose, MatSaid, MatScale, fit_mat
-from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan
+from phone_host.scan.mesh import size_of
+from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.submap_bytes import submap_bytes, submap_of

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from common import now
-from phone_host.scan.factory import scan_for
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.mesh import Mesh
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_model import ScanModel, specks
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scene.object_scene import ObjectScene, Setting, Size, mat_body, object_rig

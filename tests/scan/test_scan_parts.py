@@ -13,10 +13,9 @@ from phone_host.model import Processed, RectifiedPair, Search
 from phone_host.output.axes import Axes
 from phone_host.output.ply import PointCloud, write_surface
 from phone_host.output.trajectory_text import Station, tum_text
-from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
-from phone_host.scan.mesh import Mesh
-from phone_host.scan.mesh_parts import NO_SIZE, only, size_of, thinned, without_crumbs
+from phone_host.scan.blocks import Box
+from phone_host.scan.mesh import NO_SIZE, Mesh, only, size_of, thinned, without_crumbs
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_model import surface_noise_m
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracking_words import Tracking, Weakness

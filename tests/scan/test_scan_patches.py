@@ -6,8 +6,7 @@ import struct
 import numpy as np
 
 from phone_host.geometry.se3 import SE3
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import only
+from phone_host.scan.mesh import Mesh, mesh_of, only
 from phone_host.scan.patches import Patch, Patches
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import VolumeSettings

@@ -7,15 +7,14 @@ import pytest
 
 from phone_host.geometry.se3 import SE3
 from phone_host.native.library import Library, native
-from phone_host.scan.blocks import BLOCK_BYTES
-from phone_host.scan.box import Box, Cells
+from phone_host.scan.blocks import BLOCK_BYTES, Box, Cells
 from phone_host.scan.carving import Carving
-from phone_host.scan.factory import scan_for
 from phone_host.scan.fusion import KeptDepths
 from phone_host.scan.loop_closing import LoopSettings
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Found, Joining, Piece, PoseGate
 from phone_host.scan.pieces import Pieces
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.tracked import Tracked
 from phone_host.scan.tracker import Tracker

@@ -8,11 +8,10 @@ import pytest
 from phone_host.geometry.se3 import SE3
 from phone_host.native.library import native
 from phone_host.scan.graph import Loop, without_outliers
-from phone_host.scan.motion_belief import Belief, UsualStep
 from phone_host.scan.odometry import Moved
 from phone_host.scan.piece import Piece, PoseGate
 from phone_host.scan.pieces import Pieces
-from phone_host.scan.relocalisation import Evidence, PoseSupport, pose_support, sighted
+from phone_host.scan.relocalisation import Belief, Evidence, PoseSupport, UsualStep, pose_support, sighted
 from phone_host.scan.tracker import Tracker
 from phone_host.scan.tracking_words import Weakness
 from phone_host.scan.view import View

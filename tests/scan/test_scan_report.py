@@ -20,8 +20,7 @@ from phone_host.report.scan_lines import area_text, scan_lines
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import ModelFigures, ScanReport, scan_verdict, stretches
 from phone_host.report.stereo_report import FailedPair
-from phone_host.scan.mesh import Mesh
-from phone_host.scan.mesh_parts import MeshSize
+from phone_host.scan.mesh import Mesh, MeshSize
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.tracking_words import Tracking, Weakness

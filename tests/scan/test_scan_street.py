@@ -13,11 +13,11 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.report.scan_json import scan_json
-from phone_host.run.scan_files import trajectory_of
+from phone_host.run.scan_job import trajectory_of
 from phone_host.run.scan_result import report_of
-from phone_host.scan.factory import scan_for
 from phone_host.scan.odometry import Odometry, OdometrySettings, odometry_for
 from phone_host.scan.piece import pose_gate_for
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import PoseOrigin
 from phone_host.scan.submap_bytes import submap_bytes, submap_of

@@ -15,9 +15,8 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed, RectifiedPair
 from phone_host.run.kept_submaps import KeptSubmaps, read_submaps
 from phone_host.run.scan_result import memory_remarks
-from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
-from phone_host.scan.scan import Scan
+from phone_host.scan.blocks import Box
+from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.volume import Volume

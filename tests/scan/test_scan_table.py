@@ -17,8 +17,8 @@ from phone_host.output.axes import Axes
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
 from phone_host.output.meshes.printable import Flaw, Printer, problems
 from phone_host.output.meshes.solid import Solid
-from phone_host.scan.box import Box
-from phone_host.scan.factory import scan_for
+from phone_host.scan.blocks import Box
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.submap_bytes import submap_bytes, submap_of
 from phone_host.scan.surface import thing_box

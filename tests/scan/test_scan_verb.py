@@ -12,7 +12,7 @@ from phone_host.cli import main
 from phone_host.jobs.scan_request import box_of
 from phone_host.model.rig import Verdict
 from phone_host.output.rig_yaml import write_rig
-from phone_host.scan.box import Box
+from phone_host.scan.blocks import Box
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.still_life import small_rig
 

@@ -8,7 +8,7 @@ from common.errors import SettingsError
 from phone_host import api
 from phone_host.cli import main
 from phone_host.cli import parser as parser_of
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.mat_tracker import MatPoses

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from common import now
 from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed
-from phone_host.scan.factory import scan_for
 from phone_host.scan.mat import USUAL_MAT, parse_mat
-from phone_host.scan.scan import Scan
+from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_error import ErrorScope

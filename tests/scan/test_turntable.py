@@ -14,15 +14,13 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.ply_mesh import read_ply_mesh
-from phone_host.scan.box import Box
+from phone_host.scan.blocks import Box
 from phone_host.scan.camera_pose import Observer
 from phone_host.scan.circle_bundle import Circle, Seen, TurnAxis, axis_of, fitted_circle, unwrapped
-from phone_host.scan.factory import scan_for
 from phone_host.scan.field_bytes import KeptField, field_bytes, field_of
 from phone_host.scan.ground import table_height_m
-from phone_host.scan.mesh import Mesh
-from phone_host.scan.mesh_parts import size_of
-from phone_host.scan.scan import Scan
+from phone_host.scan.mesh import Mesh, size_of
+from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.surface_match import Match
 from phone_host.scan.tracking_words import Weakness

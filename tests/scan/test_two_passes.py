@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.cli import main
 from phone_host.geometry.se3 import SE3, rotations_of
-from phone_host.run.scan_files import read_field
+from phone_host.run.scan_job import read_field
 from phone_host.scan.field_bytes import field_bytes, field_of
 from phone_host.scan.field_sample import merged
-from phone_host.scan.mesh import Mesh, mesh_of
-from phone_host.scan.mesh_parts import size_of, without_crumbs
+from phone_host.scan.mesh import Mesh, mesh_of, size_of, without_crumbs
 from phone_host.scan.surface_match import LEAST_WEIGHT, Match, matched_surfaces
 from phone_host.scan.volume import Volume
 from tests.support.computed_volumes import volume_of

@@ -8,9 +8,9 @@ from phone_host.calibration.drift.fit import RowModel, Sighting
 from phone_host.geometry.lens import project
 from phone_host.model import AS_CALIBRATED, CameraModel, Departure, Rig, Side
 from phone_host.scene.scene_model import rotation
-from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.evidence_track import Followed
+from phone_host.stereo.rectifier import corrected_rectification, corrected_rig
 from phone_host.stereo.rectify import rectify_rig
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from phone_host.model import Departure, Drift, Rig
 from phone_host.output.overlay_yaml import overlay_text
 from phone_host.output.rig_yaml import write_rig
-from phone_host.stereo.departure import corrected_rig
+from phone_host.stereo.rectifier import corrected_rig
 from phone_host.stereo.rectify import rectify_rig
 
 _TURN_RAD = (0.002, 0.006, -0.003)

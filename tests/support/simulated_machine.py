@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from phone_host.model import BudgetReason
-from phone_host.stereo.budget import BudgetController
-from phone_host.stereo.budget_ladder import Step
+from phone_host.stereo.budget import BudgetController, Step
 from phone_host.stereo.matcher_names import AnyMatcher, MatcherName, UsualCost
 
 MS = 1_000_000

@@ -23,7 +23,7 @@ from common.protocol.message import (
 )
 from common.protocol.session import MS, Outgoing, connection_name
 from phone_host.model import BoardFrame
-from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.frame_sink import LinkFacts
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import Reception
 from phone_host.sync.fifo import FifoSettings, Overflow

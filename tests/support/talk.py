@@ -17,8 +17,7 @@ from common.protocol.session import (
     Outgoing,
     connection_name,
 )
-from phone_host.stream.frame_sink import FrameSink
-from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.frame_sink import FrameSink, LinkFacts
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.stream.reception import Reception
 from phone_host.sync.fifo import FifoSettings

@@ -13,7 +13,7 @@ from phone_host.output.rig_yaml import read_rig, write_rig
 from phone_host.scene.scene import demo_scene
 from phone_host.scene.scene_model import rig_poses
 from phone_host.scene.scene_render import render
-from phone_host.stereo.departure import corrected_rig
+from phone_host.stereo.rectifier import corrected_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.programs import board, host, program
 

@@ -15,10 +15,10 @@ from phone_host.calibration.guide.snapshot import GuideSnapshot
 from phone_host.model import Processed, RectifiedPair
 from phone_host.output.axes import Axes
 from phone_host.report.scan_report import scan_verdict
-from phone_host.run.scan_work import finished_scan
-from phone_host.scan.factory import scan_for
+from phone_host.run.scan_job import finished_scan
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.patches import Patches
+from phone_host.scan.scan import scan_for
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scene.object_scene import Setting, object_scene
 from phone_host.stereo.core import StereoCore

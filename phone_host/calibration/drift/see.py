@@ -7,10 +7,11 @@ from phone_host.calibration.drift.fit import PARAMETERS, RowModel, Sighting, fit
 from phone_host.calibration.drift.watch import FEWEST_CELLS, FEWEST_FEATURES, DriftWatch, Trends
 from phone_host.model import Drift, Image, Processed
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.evidence import Examined, grey, maps_of
+from phone_host.stereo.evidence import Examined, maps_of
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.evidence_track import Followed, follow
-from phone_host.stereo.stacked import lying, upright_points, upright_steps
+from phone_host.stereo.images import to_grey
+from phone_host.stereo.working import lying, upright_points, upright_steps
 
 _LEAST_PAIRS: Final = 7
 """From the first to the last of a line."""
@@ -45,7 +46,7 @@ def sighting_of(
     if rectifier is None:
         return None
     epipolar = processed.pair.epipolar
-    before = None if timed.before is None else lying(grey(timed.before), epipolar)
+    before = None if timed.before is None else lying(to_grey(timed.before), epipolar)
     seen = follow(look.left, look.right, look.matches, before, timed.seconds)
     size_px = (width_px, height_px)
     upright = Followed(

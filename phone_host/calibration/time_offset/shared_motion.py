@@ -29,7 +29,7 @@ from phone_host.calibration.time_offset.shots import (
 from phone_host.model import UNMEASURED_NS, Image, Side, TimeOffset
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import disparities_for_near
-from phone_host.stereo.stacked import lying_pair
+from phone_host.stereo.working import lying_pair
 
 _FEATURES: Final = 500
 _MOVING, _STILL = 60, 10

@@ -22,7 +22,7 @@ from phone_host.calibration.guide.snapshot import (
 )
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
-from phone_host.run.redrawn import Part, Redrawn
+from phone_host.run.terminal_view import Part, Redrawn
 
 _EVERY_NS: Final = 250_000_000
 """Pictures are redrawn, and snapshots written, at most so often."""

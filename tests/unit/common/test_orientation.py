@@ -5,7 +5,7 @@ import pytest
 
 from common.errors import SettingsError
 from common.orientation import UPRIGHT, Flip, Orientation, orientation_of
-from phone_host.stereo.orient import upright
+from phone_host.stereo.eight_bit import upright
 
 IMAGE = np.array([[1, 2, 3], [4, 5, 6]], np.uint8)
 

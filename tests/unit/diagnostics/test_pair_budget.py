@@ -33,7 +33,7 @@ from phone_host.report.run_page import run_page
 from phone_host.report.summary import summary
 from phone_host.run.pair_budget import PairBudget, usable_matchers
 from phone_host.settings import check, resolve_settings
-from phone_host.stereo.budget_ladder import BudgetWanted, Choice
+from phone_host.stereo.budget import BudgetWanted, Choice
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings

@@ -10,7 +10,7 @@ from phone_host.geometry.unseen_surface import (
     filled_from_border,
     unseen_share,
 )
-from phone_host.model.unseen import UnseenSurface
+from phone_host.model import UnseenSurface
 
 SIDE = 21
 

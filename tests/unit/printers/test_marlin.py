@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError, SettingsError, TakenError, UnavailableError
+from phone_host.printers.door import Phase
 from phone_host.printers.gcode import GcodeFacts, Line, examine, lines_of, name_of
 from phone_host.printers.journal import Entry, Journal
 from phone_host.printers.line import require_allowed
 from phone_host.printers.marlin import MarlinSender
 from phone_host.printers.marlin_rules import framed
 from phone_host.printers.printer_uri import FileUri, LineKind, LineUri, ServerKind, ServerUri, read_uri
-from phone_host.printers.progress import Phase
 
 S = 1_000_000_000
 
@@ -132,7 +132,7 @@ def test_a_pause_sends_nothing_and_a_print_that_is_over_is_not_cancelled() -> No
     talk.sender.pause()
     talk.hear("ok", "", "echo:idle", "ok")
     assert talk.sent(S) == b""
-    assert not talk.sender.may_pause
+    assert talk.sender.phase.value == "paused"
     talk.sender.resume()
     assert talk.sent() == framed(2, "G1 X2")
     talk.hear("ok")

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
+from phone_host.printers.door import Phase
 from phone_host.printers.marlin_rules import SenderOptions
-from phone_host.printers.progress import Phase
 from tests.unit.printers.test_marlin_limits import DRAWN, Bench, fine
 
 Answers = Callable[[str], list[str]]

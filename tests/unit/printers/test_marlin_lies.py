@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from phone_host.printers.progress import Phase
+from phone_host.printers.door import Phase
 from tests.unit.printers.test_marlin_limits import DRAWN, Bench, S
 
 

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable
 import pytest
 
 from phone_host.printers.cooling import heaters_off, last_lines
+from phone_host.printers.door import Phase
 from phone_host.printers.gcode import Line, examine
 from phone_host.printers.marlin import MarlinSender
 from phone_host.printers.marlin_reply import HostAction, ReplyKind, read_reply
 from phone_host.printers.marlin_rules import SenderOptions, framed, may_outlast_guard
-from phone_host.printers.progress import Phase
 
 S = 1_000_000_000
 STEP_NS = S // 20

@@ -7,7 +7,7 @@ import pytest
 
 from common.errors import UnavailableError
 from phone_host.discovery.found import Announcement
-from phone_host.printers.announced_printers import FoundPrinter, printers_of
+from phone_host.printers.printer_uri import FoundPrinter, printers_of
 from phone_host.printers.prusalink import digest_header
 from phone_host.printers.server_answer import Answer, Value
 

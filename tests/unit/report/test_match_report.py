@@ -23,11 +23,11 @@ from phone_host.report.run_page import run_page
 from phone_host.report.summary import summary
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
-from phone_host.stereo.match import MatchSettings, create_matcher, make_matcher
+from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.match_block import BlockMatcher
 from phone_host.stereo.match_sgbm import SgbmMatcher
 from phone_host.stereo.match_tandem import TandemMatcher
-from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_names import MatcherName, matcher_named
 from phone_host.stereo.matcher_protocol import ReportingMatcher, matched_by
 from tests.support.planes import plane
 from tests.support.run_snapshots import run
@@ -49,12 +49,11 @@ class _Confident:
 
 
 def test_a_name_as_typed_makes_a_matcher() -> None:
-    """`make_matcher` takes the name that a user types, and refuses an unknown one."""
-    assert isinstance(make_matcher("block", 16), BlockMatcher)
-    assert isinstance(make_matcher("sgbm", 16), SgbmMatcher)
-    assert isinstance(make_matcher("tandem", 16), TandemMatcher)
+    """A matcher is made by the name that a user types, and an unknown one is refused."""
+    for name, kind in (("block", BlockMatcher), ("sgbm", SgbmMatcher), ("tandem", TandemMatcher)):
+        assert isinstance(create_matcher(MatchSettings(matcher_named(name), 16)), kind)
     with pytest.raises(SettingsError, match="magic"):
-        make_matcher("magic", 16)
+        matcher_named("magic")
 
 
 def test_sgbm_reports_the_vertical_error_and_the_levels() -> None:

@@ -9,15 +9,14 @@ import pytest
 from common import now
 from phone_host.calibration.drift.see import Timed
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Processed, Result, Side
-from phone_host.run.drift_keeper import DriftKeeper, Moment, log_change
+from phone_host.run.trust_sink import DriftKeeper, Moment, log_change
 from phone_host.scene.scene import demo_scene
 from phone_host.scene.scene_model import rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.departure import corrected_rig
 from phone_host.stereo.evidence import look_at, maps_of
 from phone_host.stereo.match import MatchSettings
-from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectifier import Rectifier, corrected_rig
 from tests.support.results import result
 from tests.support.rigs import small_rig
 

@@ -9,7 +9,7 @@ import pytest
 _CODE = """
 import resource, sys
 import numpy as np
-from phone_host.run.freed_memory import keep_freed_memory
+from phone_host.run.kept import keep_freed_memory
 if sys.argv[1] == "kept":
     keep_freed_memory()
 def pair():

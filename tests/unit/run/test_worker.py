@@ -10,8 +10,7 @@ from common import now
 from common.frame import PixelFormat
 from phone_host.model import Disparity, RectifiedPair, Side
 from phone_host.run.ledgerer import Ledgerer
-from phone_host.run.pipeline import Pipeline
-from phone_host.run.worker import Worker
+from phone_host.run.pipeline import Pipeline, Worker
 from phone_host.stereo.core import StereoCore
 from phone_host.stream.pair_queue import PairQueue
 from phone_host.sync.fifo import FifoSettings

@@ -10,9 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phone_host.model import BudgetReason, Search
-from phone_host.stereo.budget import BudgetController
-from phone_host.stereo.budget_cost import CostModel
-from phone_host.stereo.budget_ladder import BudgetWanted, Choice, Extent, Step, ladder
+from phone_host.stereo.budget import BudgetController, BudgetWanted, Choice, CostModel, Extent, Step, ladder
 from phone_host.stereo.matcher_names import BEST_FIRST, AnyMatcher, MatcherName, UsualCost
 from tests.support.simulated_machine import MS, Machine, Played, S
 

@@ -6,14 +6,13 @@ import pytest
 from common import now
 from phone_host.model import AS_CALIBRATED, Departure, Epipolar, Side
 from phone_host.stereo.core import StereoCore
-from phone_host.stereo.departure import corrected_rectification, corrected_rig
 from phone_host.stereo.evidence import maps_of
 from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.rectifier import Rectifier
+from phone_host.stereo.rectifier import Rectifier, corrected_rectification, corrected_rig
 from phone_host.stereo.rectify import rectify_rig
-from phone_host.stereo.stacked import lying, upright_points, upright_steps
+from phone_host.stereo.working import lying, upright_points, upright_steps
 from tests.support.drift_sightings import sight, two_webcams
 
 TURNED = Departure(turn_rad=(0.005, -0.003, 0.004), focal=1.01)

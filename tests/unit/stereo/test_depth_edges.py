@@ -16,7 +16,7 @@ from phone_host.geometry.schur import Flags
 from phone_host.model import Crop, CutCounts, Image, Processed, RectifiedPair, Search, StereoGeometry
 from phone_host.stereo.evidence_features import Matches
 from phone_host.stereo.evidence_search import beyond_search, measure_fit
-from phone_host.stereo.match_told import MOST_PIXELS, untold
+from phone_host.stereo.match_tandem import MOST_PIXELS, untold
 from phone_host.stereo.plane_fit import fit_plane, plane_at
 from phone_host.stereo.plane_quality import NoTruth, measure_plane
 from phone_host.stereo.point_match import PointMatch, Unmatched, match_point

@@ -36,7 +36,7 @@ from phone_host.scene.scene_model import Look, rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
-from phone_host.stereo.evidence import density, has_depth, maps_of, measure_evidence
+from phone_host.stereo.evidence import density, has_depth, look_at, maps_of
 from phone_host.stereo.evidence_points import ThroughRig, Unmoved, turned_back
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
@@ -97,7 +97,7 @@ def raw(turned_rig: Rig) -> Pair:
 
 def _evidence(core: StereoCore, left: Image, right: Image) -> Evidence:
     processed = core.compute(left, right, now.monotonic_ns)
-    return measure_evidence(processed, maps_of(core, processed))
+    return look_at(processed, maps_of(core, processed)).evidence
 
 
 def _doubts(core: StereoCore, left: Image, right: Image) -> list[str]:
@@ -235,9 +235,9 @@ def test_a_turn_goes_about_the_middle_of_the_image() -> None:
 def test_without_a_rig_only_brightness_is_judged(good: Pair) -> None:
     """Pairs of a run without calibration are not accused of any arrangement, but a covered camera is named."""
     swapped = Processed(RectifiedPair(good[1], good[0]), None, None, StageTimes())
-    assert image_doubts(measure_evidence(swapped, None)) == ()
+    assert image_doubts(look_at(swapped, None).evidence) == ()
     blind = replace(swapped, pair=RectifiedPair(good[0], _noise(good[1], 3, 1)))
-    assert [concern.code for concern in image_doubts(measure_evidence(blind, None))] == [Code.COVERED]
+    assert [concern.code for concern in image_doubts(look_at(blind, None).evidence)] == [Code.COVERED]
 
 
 def test_images_without_anything_in_them_are_measured_too() -> None:
@@ -268,13 +268,13 @@ def test_specks_are_told_from_surfaces(good: Pair) -> None:
     core = FLAT
     processed = core.compute(*good, now.monotonic_ns)
     disparity = np.asarray(processed.disparity).copy()
-    assert measure_evidence(processed, maps_of(core, processed)).scattered_share < 0.09
+    assert look_at(processed, maps_of(core, processed)).evidence.scattered_share < 0.09
     height, width = disparity.shape
     random = np.random.default_rng(5)
     specks = np.kron(random.uniform(2, 40, (height // 16, width // 8)), np.ones((8, 8))).astype(np.float32)
     disparity[: specks.shape[0], : specks.shape[1]] = specks
     strewn = replace(processed, disparity=disparity, cloud=None, cut=None)
-    assert measure_evidence(strewn, maps_of(core, strewn)).scattered_share == pytest.approx(0.5, abs=0.1)
+    assert look_at(strewn, maps_of(core, strewn)).evidence.scattered_share == pytest.approx(0.5, abs=0.1)
 
 
 def test_a_doffs_of_other_images_is_told(good: Pair) -> None:
@@ -292,12 +292,12 @@ def test_a_principal_point_of_other_images_is_told(good: Pair) -> None:
         geometry = StereoGeometry(focal_px=260.0, baseline_m=0.1, cx_px=cx_px, cy_px=119.5, doffs_px=doffs_px)
         core = StereoCore(create_matcher(MatchSettings(MatcherName.SGBM, 64)), geometry=geometry)
         processed = core.compute(*good, lambda: 0)
-        live = image_doubts(measure_evidence(processed, maps_of(core, processed)))
+        live = image_doubts(look_at(processed, maps_of(core, processed)).evidence)
         assert live == judge_pair(core, processed).concerns
         said = [concern for concern in live if "the principal point 35,120 lies far" in concern.message]
         assert [concern.code for concern in said] == ([Code.GEOMETRY] if told else [])
         assert len(live) == len(said)
-        rig = measure_evidence(processed, ThroughRig(_rig(), Rectifier(_rig()).rectification))
+        rig = look_at(processed, ThroughRig(_rig(), Rectifier(_rig()).rectification)).evidence
         assert rig.off_middle is None
 
 
@@ -310,7 +310,7 @@ def test_the_middle_of_the_scene_is_that_of_what_is_kept() -> None:
     limits = DepthLimits(near_m=0.0, far_m=1.0, disparity_error_px=0.25, from_rig=False)
     for given, middle in ((None, 10.0), (limits, 40.0)):
         processed = Processed(pair, disparity, None, StageTimes(), geometry=geometry, limits=given)
-        assert measure_evidence(processed, Unmoved(80, 60)).disparity_px == middle
+        assert look_at(processed, Unmoved(80, 60)).evidence.disparity_px == middle
 
 
 def test_a_crop_raises_no_doubt(good: Pair) -> None:
@@ -343,7 +343,7 @@ def test_stacked_cameras_are_judged_along_their_columns(epipolar: Epipolar) -> N
     assert trust.answer.grade is Grade.GOOD
     assert trust.figures.vertical_px < 1
     assert trust.figures.density > 0.5
-    evidence = measure_evidence(processed, maps_of(core, processed))
+    evidence = look_at(processed, maps_of(core, processed)).evidence
     features = {support.arrangement: support.features for support in evidence.supports}
     assert features[Arrangement.RIGHT] > 50 > features[Arrangement.SWAPPED]
 
@@ -362,7 +362,7 @@ def test_evidence_of_a_photograph_takes_less_memory_than_its_disparities() -> No
     processed = Processed(RectifiedPair(image, np.roll(image, -8, axis=1)), disparity, None, StageTimes())
     tracemalloc.start()
     try:
-        evidence = measure_evidence(processed, Unmoved(4000, 3000))
+        evidence = look_at(processed, Unmoved(4000, 3000)).evidence
         peak_bytes = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -20,9 +20,8 @@ from phone_host.scene.scene_model import Look, rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
-from phone_host.stereo.evidence import maps_of, measure_evidence
-from phone_host.stereo.evidence_rows import row_skew_px
-from phone_host.stereo.evidence_search import beyond_search
+from phone_host.stereo.evidence import look_at, maps_of
+from phone_host.stereo.evidence_search import beyond_search, row_skew_px
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.rectifier import Rectifier
@@ -71,7 +70,7 @@ def _core(
 
 def _evidence(core: StereoCore, left: Image, right: Image) -> Evidence:
     processed = core.compute(left, right, now.monotonic_ns)
-    return measure_evidence(processed, maps_of(core, processed))
+    return look_at(processed, maps_of(core, processed)).evidence
 
 
 def _found(core: StereoCore, left: Image, right: Image) -> tuple[Diagnostic, ...]:

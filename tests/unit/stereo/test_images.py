@@ -14,7 +14,7 @@ from phone_host.stereo.eight_bit import to_8_bit
 from phone_host.stereo.images import (
     decode,
     decode_files,
-    decode_pair,
+    examine,
     open_image,
     read_image,
     require_same_size,
@@ -65,7 +65,7 @@ def test_a_16_bit_copy_of_an_8_bit_pair_gives_the_same_images(tmp_path: Path) ->
 def test_both_images_get_one_scale(bits: int) -> None:
     """A right image half as bright stays half as bright, for every usual sensor depth."""
     left = np.linspace(0, 2**bits - 1, 4096).reshape(64, 64).astype(np.uint16)
-    first, second = decode_pair(_png(left), _png(left // 2))
+    first, second = decode_files(examine(_png(left), "left"), examine(_png(left // 2), "right"))
     assert first.max() == 255
     np.testing.assert_allclose(second.astype(float), first / 2, atol=1)
 

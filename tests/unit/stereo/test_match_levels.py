@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from phone_host.model import Image
-from phone_host.stereo.match_align import overall_levels
-from phone_host.stereo.match_levels import UNCHANGED, LevelField, levels_between, without_levels
+from phone_host.stereo.match_align import with_levels_of
+from phone_host.stereo.match_differences import UNCHANGED, LevelField, levels_between, without_levels
 from tests.support.planes import noise, plane
 
 SHIFT_PX = 60
@@ -36,7 +36,7 @@ def _known(image: Image) -> np.ndarray:
 def test_what_only_one_camera_sees_does_not_change_the_levels() -> None:
     """Two cameras of equal levels keep them within 1 %, though mean and deviation of the whole images say otherwise."""
     left, right = _unlike_views()
-    assert abs(overall_levels(left, right).of(right).astype(float).mean() - right.mean()) > 20
+    assert abs(with_levels_of(left, right).astype(float).mean() - right.mean()) > 20
     levels = levels_between(left, right, _known(left))
     assert levels.gain == pytest.approx(1, abs=0.01)
     assert levels.offset_levels == pytest.approx(0, abs=1.5)

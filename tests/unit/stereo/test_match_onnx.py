@@ -12,8 +12,7 @@ from common.errors import DataError, SettingsError, TandemError, UnavailableErro
 from phone_host.model import RectifiedPair
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.match_onnx import OnnxMatcher
-from phone_host.stereo.matcher_names import matcher_named
-from phone_host.stereo.network_name import Check, Levels, NetworkMatcher, Sign, network_named
+from phone_host.stereo.matcher_names import Check, Levels, NetworkMatcher, Sign, matcher_named, network_named
 from tests.support.networks import Element, Form, Graph, block_network, value_info
 from tests.support.planes import noise
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from phone_host.model import Confidence, Disparity, Image, RectifiedPair
 from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.match_told import untold, without_untold
+from phone_host.stereo.match_tandem import untold, without_untold
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.matcher_protocol import matched_by
 from phone_host.stereo.working import reduced

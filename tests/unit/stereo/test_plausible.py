@@ -6,7 +6,7 @@ import pytest
 
 from common.errors import DataError, SettingsError
 from phone_host.model import StereoGeometry
-from phone_host.stereo.plausible import is_off_the_middle, require_plausible, require_plausible_file
+from phone_host.stereo.depth_limits import is_off_the_middle, require_plausible, require_plausible_file
 
 
 def _geometry(focal_px: float = 995.0, cx_px: float = 311.0, cy_px: float = 255.0) -> StereoGeometry:

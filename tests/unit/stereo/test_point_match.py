@@ -8,11 +8,17 @@ import pytest
 from numpy.typing import NDArray
 
 from phone_host.model import Disparity, Epipolar, Image, RectifiedPair, StereoGeometry
-from phone_host.stereo.between_pixels import cubic
-from phone_host.stereo.measured_point import MeasuredPoint, Within, distance_between, measured_point
+from phone_host.stereo.measured_point import (
+    MeasuredPoint,
+    Wide,
+    Within,
+    ZeroError,
+    distance_between,
+    measured_point,
+    why_wide,
+)
 from phone_host.stereo.point_match import PointMatch, Unmatched, match_point
-from phone_host.stereo.rig_errors import ZeroError
-from phone_host.stereo.wide_limits import Wide, why_wide
+from phone_host.stereo.point_window import cubic
 from tests.support.planes import Plane, noise, plane
 
 GEOMETRY = StereoGeometry(focal_px=500.0, baseline_m=0.1, cx_px=159.5, cy_px=79.5)

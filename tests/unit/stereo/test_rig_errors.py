@@ -17,10 +17,16 @@ from phone_host.geometry.lens import (
 )
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import RIG_PARAMETERS, Epipolar, Rig
-from phone_host.stereo.measured_point import MeasuredPoint, distance_between, measured_point
+from phone_host.stereo.measured_point import (
+    Known,
+    MeasuredPoint,
+    ZeroError,
+    distance_between,
+    measured_point,
+    rig_errors,
+)
 from phone_host.stereo.point_match import PointMatch
 from phone_host.stereo.rectify import rectify_points, rectify_rig
-from phone_host.stereo.rig_errors import Known, ZeroError, rig_errors
 from tests.support.rigs import fisheye_rig, project_points, unlike_rig
 
 _POINTS_M = np.array([[0.1, 0.05, 0.8], [-0.2, 0.1, 1.5], [0.0, -0.1, 0.5]])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from common.frame import FrameFault, SpoiledImageError
-from phone_host.stereo.images import decode, decode_pair
+from phone_host.stereo.images import decode, decode_files, examine
 from phone_host.stereo.overheard import overhear
 from tests.support import bombs
 from tests.support.decoder_watch import watched_decoder
@@ -106,7 +106,7 @@ def test_words_of_other_decoders_are_not_printed(capfd: pytest.CaptureFixture[st
 def test_both_images_of_a_pair_are_heard() -> None:
     """The spoiled one is named."""
     with pytest.raises(SpoiledImageError, match="the right one"):
-        decode_pair(SOUND, SPOILED["bits flipped"], "the left one", "the right one")
+        decode_files(examine(SOUND, "the left one"), examine(SPOILED["bits flipped"], "the right one"))
 
 
 def test_threads_do_not_hear_each_other() -> None:

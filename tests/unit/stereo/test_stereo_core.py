@@ -14,8 +14,8 @@ from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
 from phone_host.stereo.match import MatchSettings, create_matcher
-from phone_host.stereo.match_input import check_pair, grey
 from phone_host.stereo.matcher_names import MatcherName
+from phone_host.stereo.matcher_protocol import check_pair, grey
 from phone_host.stereo.rectifier import Rectifier
 from tests.support.planes import noise
 from tests.support.rigs import unlike_rig

@@ -21,10 +21,10 @@ from phone_host.model import FramePair, Image, Side
 from phone_host.recording import footage
 from phone_host.run.pipeline import Pipeline
 from phone_host.stereo.core import StereoCore
+from phone_host.stereo.eight_bit import upright
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
-from phone_host.stereo.orient import upright
 from phone_host.stereo.raw_images import EncodedImage
 from phone_host.stereo.rectifier import Rectifier
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, write_film

@@ -6,15 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phone_host.model import Crop, Epipolar, RectifiedPair
-from phone_host.stereo.stacked import lying, upright_again
 from phone_host.stereo.working import (
     MOST_PIXELS,
     MOST_STEPS,
     chosen_scale,
     confidence_of_known,
+    lying,
     part_for,
     reduced,
     to_full_size,
+    upright_again,
 )
 from tests.support.planes import noise
 

@@ -32,8 +32,7 @@ from common.protocol.session import (
     connection_name,
 )
 from phone_host.model import BoardFrame
-from phone_host.stream.frame_sink import FrameSink, NoFrames
-from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.frame_sink import FrameSink, LinkFacts, NoFrames
 from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.quarantine import Disbelief

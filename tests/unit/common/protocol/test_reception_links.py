@@ -8,7 +8,7 @@ from common.ledger import BoardMarks
 from common.protocol.board_session import BoardSession
 from common.protocol.message import BoardCounts, Lane, Ping
 from common.protocol.session import MS, Outgoing, connection_name
-from phone_host.stream.link_facts import LinkFacts
+from phone_host.stream.frame_sink import LinkFacts
 from phone_host.stream.reception import Reception
 from tests.support.samples import CAMERA, FRAME
 from tests.support.unkept import Unkept

@@ -25,7 +25,7 @@ from common.protocol.message import (
 from common.protocol.session import MS, STATUS_NS, Accepted, LocksTold, Outgoing, connection_name
 from common.protocol.wire import MAX_HEADER_BYTES, decode, encode
 from common.versions import PROTOCOL_VERSION
-from phone_host.stream.lock_asking import LockAsking
+from phone_host.stream.refusals import LockAsking
 from tests.support.samples import CAMERA
 
 NOW_NS = 10**12
