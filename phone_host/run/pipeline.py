@@ -1,7 +1,4 @@
-"""The processing of a pair: decode, optionally interpolate and rectify, match, reproject. Each stage is timed. The worker takes pairs from the queue and passes the results to the sinks.
-
-This module alone defines the order of the stages.
-"""
+"""The processing of a pair: decode, interpolate if asked, and let the stereo core compute its depth. Each stage is timed. The worker takes pairs from the queue and passes the results to the sinks."""
 
 import logging
 import threading

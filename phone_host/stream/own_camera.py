@@ -1,7 +1,4 @@
-"""The host camera in its own thread. Frames are delivered as they come, or as the demand clock asks for them.
-
-Corrections of a camera's phase, this one's or the board's, are on their way from the thread that orders them to the one that applies them.
-"""
+"""The host camera in its own thread. Frames are delivered as they come, or as the demand clock asks for them."""
 
 import threading
 from collections.abc import Callable
@@ -13,37 +10,8 @@ from common import now
 from common.camera.base import Camera, CameraHealth, Ended, Grab, Skipped, Spoiled, held_locks, lockable
 from common.frame import Frame
 from common.protocol.message import Locks, Steering
+from phone_host.stream.corrections import Corrections
 from phone_host.stream.demand_clock import DemandClock
-
-
-class Corrections:
-    """The sum of the corrections that are ordered but not yet applied.
-
-    Each correction is relative to the camera's present phase, so two corrections equal one of their sum. One number
-    therefore holds any number of corrections and loses none.
-
-    Attributes:
-        is_due: whether there is a correction to apply. Read without the lock.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._later_ns = 0
-        self.is_due = False
-
-    def add(self, later_ns: int) -> None:
-        """Let the camera expose later by `later_ns`, in addition to what is already due."""
-        with self._lock:
-            self._later_ns += later_ns
-            self.is_due = self._later_ns != 0
-
-    def take(self) -> int:
-        """Return the sum that is due, ns, and reset it: the caller applies it. 0: nothing is due."""
-        with self._lock:
-            later_ns, self._later_ns = self._later_ns, 0
-            self.is_due = False
-            return later_ns
-
 
 _LONGEST_WAIT_MS: Final = 100
 """Longest time that the end of a run waits for this thread, and by which a stall may be noticed late."""

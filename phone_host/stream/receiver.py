@@ -14,8 +14,8 @@ from common.protocol.message import BoardHello, Locks, LockState, Ping
 from common.protocol.session import Outgoing, connection_name
 from common.protocol.wire import VersionError, decode, encode_stamped
 from phone_host.accounts.link_account import LinkAccount
+from phone_host.stream.corrections import Corrections
 from phone_host.stream.frame_sink import FrameSink, LinkFacts
-from phone_host.stream.own_camera import Corrections
 from phone_host.stream.reception import Reception
 from phone_host.stream.refusals import BoardRefusal
 from phone_host.sync.clock import ClockEstimate

@@ -106,10 +106,14 @@ class Stream:
     def more(self, pairs: int, when: str) -> None:
         """Wait for this many further pairs."""
         wanted = self.pairs + pairs
-        deadline = time.monotonic() + PATIENCE_S
-        while self.pairs < wanted:
+        self.until(lambda: self.pairs >= wanted, f"{pairs} pairs {when}")
+
+    def until(self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> None:
+        """Wait for a condition; after a minute, or when the host has ended, fail with what the host says."""
+        deadline = time.monotonic() + patience_s
+        while not condition():
             assert self.receiver.process.poll() is None, f"the host has ended: {self.receiver.stderr[-2000:]}"
-            late = f"not within {PATIENCE_S:.0f} s: {pairs} pairs {when}; the host says: {self.receiver.stderr[-2000:]}"
+            late = f"not within {patience_s:.0f} s: {what}; the host says: {self.receiver.stderr[-2000:]}"
             assert time.monotonic() < deadline, late
             time.sleep(0.05)
 

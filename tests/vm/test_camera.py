@@ -155,7 +155,7 @@ def test_a_camera_out_of_step_is_steered_by_restarting_it(
     webcam.start_with_phase(37_000_000)
     starts = webcam.starts
     with streaming(guest, film.right, tmp_path / "out", ("--align-phase", "board")) as stream:
-        until(lambda: "state=aligned" in stream.receiver.stderr, "both cameras are in step")
+        stream.until(lambda: "state=aligned" in stream.receiver.stderr, "both cameras are in step")
         period_ms = 1000 / FPS
         phase_ms = (webcam.phase_ns / 1e6 + period_ms / 2) % period_ms - period_ms / 2
         stream.more(5, "in step")

@@ -18,9 +18,10 @@ from common.protocol.board_session import BoardSession
 from common.protocol.message import BoardCounts, Pacing, Steer
 from common.protocol.session import MS, connection_name
 from common.protocol.wire import decode, encode_stamped
+from phone_host.stream.corrections import Corrections
 from phone_host.stream.demand_clock import DemandClock
 from phone_host.stream.frame_sink import NoFrames
-from phone_host.stream.own_camera import Corrections, OwnCamera
+from phone_host.stream.own_camera import OwnCamera
 from phone_host.stream.receiver import Receiver
 from tests.support.pictures import jpeg
 from tests.support.programs import until
