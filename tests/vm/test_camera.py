@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.point_files import read_pfm
-from tests.support.programs import ledgers, until
+from tests.support.programs import PATIENCE_S, ledgers, until
 from tests.vm.conftest import READOUT_MS
 from tests.vm.guest import UNIT, Guest
 from tests.vm.stream import FPS, NUMBER_ROWS, Film, Skew, board_accounts, check_journal, streaming
@@ -155,7 +155,8 @@ def test_a_camera_out_of_step_is_steered_by_restarting_it(
     webcam.start_with_phase(37_000_000)
     starts = webcam.starts
     with streaming(guest, film.right, tmp_path / "out", ("--align-phase", "board")) as stream:
-        stream.until(lambda: "state=aligned" in stream.receiver.stderr, "both cameras are in step")
+        # Twelve tries of a few seconds, if starts scatter.
+        stream.until(lambda: "state=aligned" in stream.receiver.stderr, "both cameras are in step", 2 * PATIENCE_S)
         period_ms = 1000 / FPS
         phase_ms = (webcam.phase_ns / 1e6 + period_ms / 2) % period_ms - period_ms / 2
         stream.more(5, "in step")

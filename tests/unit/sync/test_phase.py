@@ -153,14 +153,14 @@ def test_slow_drift_is_corrected_again_and_again() -> None:
 
 @pytest.mark.parametrize(("follows", "drift"), [(False, 0.0), (True, 3000e-6)])
 def test_a_camera_that_does_not_follow_is_given_up_in_words(follows: bool, drift: float) -> None:  # noqa: FBT001
-    """A sensor that ignores restarts, or drifts away faster than it can be steered, is left alone after six attempts, and the report says so."""
+    """A sensor that ignores restarts, or drifts away faster than it can be steered, is left alone after twelve attempts, and the report says so."""
     pair = Pair(
         PhaseController(Steering.RESTART, Steering.NONE, has_phase=True), 12.0 * MS, drift=drift, follows=follows
     )
     pair.run(120, random.Random(2))
     alignment = pair.controller.alignment
     assert alignment.state is Aligning.GIVEN_UP
-    assert len(pair.corrections) == 6
+    assert len(pair.corrections) == 12
     assert "board's camera does not follow" in alignment.words
     assert "--interpolate" in alignment.words
 
@@ -230,25 +230,25 @@ def corrected(controller: PhaseController, now_ns: int, times: int) -> int:
     return now_ns
 
 
-def test_six_corrections_in_vain_are_enough() -> None:
-    """A camera whose phase six corrections have left at 12 ms is steered no more, and advice is given; the reported phase before is that before the first one."""
+def test_twelve_corrections_in_vain_are_enough() -> None:
+    """A camera whose phase twelve corrections have left at 12 ms is steered no more, and advice is given; the reported phase before is that before the first one."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
-    now_ns = corrected(controller, 10**12, 6) + 2000 * MS
+    now_ns = corrected(controller, 10**12, 12) + 2000 * MS
     assert (
         controller.update(now_ns, Phase(time_skew_ns=13.0 * MS, period_ns=PERIOD_NS, drift=math.nan, first_ns=now_ns))
         is None
     )
     alignment = controller.alignment
-    assert (alignment.state, alignment.corrections) == (Aligning.GIVEN_UP, 6)
+    assert (alignment.state, alignment.corrections) == (Aligning.GIVEN_UP, 12)
     assert (alignment.before_ns, alignment.after_ns) == (12.0 * MS, 13.0 * MS)
     assert "13.0 ms" in alignment.words
     assert "--interpolate" in alignment.words
 
 
 def test_a_camera_that_stayed_in_step_has_all_its_tries_again() -> None:
-    """Five corrections, ten seconds in step, then five more: a camera that drifts slowly is not given up because of old corrections."""
+    """Eleven corrections, ten seconds in step, then eleven more: a camera that drifts slowly is not given up because of old corrections."""
     controller = PhaseController(Steering.GRID, Steering.NONE, has_phase=True)
-    now_ns = corrected(controller, 10**12, 5)
+    now_ns = corrected(controller, 10**12, 11)
     for _ in range(12):
         now_ns += 1000 * MS
         assert (
@@ -256,5 +256,22 @@ def test_a_camera_that_stayed_in_step_has_all_its_tries_again() -> None:
             is None
         )
         assert controller.alignment.state is Aligning.ALIGNED
-    corrected(controller, now_ns, 5)
-    assert controller.alignment.corrections == 10
+    corrected(controller, now_ns, 11)
+    assert controller.alignment.corrections == 22
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_camera_whose_starts_scatter_is_brought_in_step(seed: int) -> None:
+    """Every start of a camera at 10 fps is late by another 20 ms or so (one of nine was given up after six corrections)."""
+    drawn = random.Random(seed)
+    period_ns = 100 * MS
+    controller = PhaseController(Steering.RESTART, Steering.NONE, has_phase=True)
+    skew_ns, now_ns = 37.0 * MS, 10**12
+    for _ in range(20):
+        now_ns += 3000 * MS
+        phase = Phase(time_skew_ns=skew_ns, period_ns=period_ns, drift=0.0, first_ns=now_ns, scatter_ns=1.0 * MS)
+        correction = controller.update(now_ns, phase)
+        if correction is not None:
+            off_ns = skew_ns + correction.later_ns + drawn.gauss(0, 20 * MS)
+            skew_ns = (off_ns + period_ns / 2) % period_ns - period_ns / 2
+    assert controller.alignment.state is Aligning.ALIGNED
