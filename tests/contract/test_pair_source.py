@@ -19,6 +19,7 @@ from phone_host.run.host_settings import EndReason, HostSettings
 from phone_host.run.sinks import FunctionSink, Sink
 from tests.support.board_thread import board_of
 from tests.support.numbered import write_film
+from tests.support.own_threads import own_threads
 from tests.support.recorded import recording_file
 
 PAIRS = 12
@@ -75,7 +76,7 @@ def test_pairs_come_once_and_in_order_and_every_frame_is_accounted_for(source: s
 @pytest.mark.parametrize("source", SOURCES)
 def test_a_user_who_stops_ends_it(source: str, tmp_path: Path) -> None:
     """While the first pair is processed and others wait: the run ends, and no thread of it is left."""
-    before, one, asked = set(threading.enumerate()), threading.Event(), threading.Event()
+    before, one, asked = own_threads(), threading.Event(), threading.Event()
 
     def take(_: Result) -> None:
         one.set()
@@ -90,4 +91,4 @@ def test_a_user_who_stops_ends_it(source: str, tmp_path: Path) -> None:
         ended = host.run(stop)
     # A recording at our pace has been read to its end by then.
     assert ended is EndReason.STOPPED or (source == "recording at ours" and ended is EndReason.STREAM_ENDED)
-    assert not {thread.name for thread in set(threading.enumerate()) - before if thread.is_alive()}
+    assert not {thread.name for thread in own_threads() - before if thread.is_alive()}

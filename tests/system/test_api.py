@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +16,7 @@ from phone_host.model import CameraModel, Disparity, RectifiedPair, Rig
 from phone_host.output.rig_yaml import write_rig
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.numbered import HEIGHT_PX, WIDTH_PX, number_of, saved_numbers, write_film
+from tests.support.own_threads import own_threads
 from tests.support.point_files import read_ply
 from tests.support.programs import board, until
 
@@ -99,12 +99,12 @@ def test_a_slow_program_gets_the_newest_and_holds_nobody_up(live: tuple[str, str
 def test_a_program_may_leave_at_any_time(live: tuple[str, str]) -> None:
     """After `break` in the middle of a lossless scan all its threads have ended."""
     link, camera = live
-    before = set(threading.enumerate())
+    before = own_threads()
     with open_scanner(link=link, camera=camera, lossless=True) as scanner:
         for result in scanner:
             if result.number == 3:
                 break
-    until(lambda: set(threading.enumerate()) <= before, "the scanner's threads are gone")
+    until(lambda: own_threads() <= before, "the scanner's threads are gone")
 
 
 def test_what_ends_a_run_is_raised(live: tuple[str, str], film: Path, tmp_path: Path) -> None:
