@@ -1,4 +1,4 @@
-"""Computes pairs of image files one after another; the verbs take what comes of each. The loop of everything that reads files.
+"""Computes pairs of image files one after another; `stereo`, `quality` and `scan` take what comes of each. The loop of everything that reads files.
 
 A pair that cannot be computed is named, and the others go on. Without a core no pair can be computed: that ends the work.
 """
@@ -18,13 +18,14 @@ from common.words import counted
 from phone_host.diagnostics.codes import BLOCKING
 from phone_host.model import Processed
 from phone_host.report.stereo_report import FailedPair, Size
-from phone_host.run.kept import keep_freed_memory, partial_words, tell_if_heard
-from phone_host.run.stereo_remarks import judge_pair
+from phone_host.run.kept import keep_freed_memory, kept_if_interrupted, partial_words, tell_if_heard
+from phone_host.run.stereo_remarks import files_remarks, judge_pair
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.images import EncodedFile, decode_files, open_image, require_same_size, size_px
 from phone_host.stereo.view_files import ViewFiles
 
 T = TypeVar("T")
+R = TypeVar("R")
 
 MATCHING: Final = ("matching",)
 EACH_STAGE: Final = ("rectifying", "matching", "computing points")
@@ -74,6 +75,11 @@ class FilePairs(Matching):
     matcher_note: str = ""
     tell: Callable[[str], None] = lambda _: None
 
+    @property
+    def remarks(self) -> tuple[Diagnostic, ...]:
+        """What is to be said of all pairs together; see `files_remarks`."""
+        return files_remarks(self.files, self.matcher_note)
+
     def tell_of_partial(self, place: Path, done: int) -> None:
         """Tell where the results of a part of the pairs are, and that the earlier results stay."""
         count = counted(len(self.files.pairs), "pair")
@@ -109,12 +115,11 @@ class PairMatcher:
     """Reads and matches pairs with as few cores as possible.
 
     Attributes:
-        watcher: is told how far it is.
         has_no_core: whether no core can be made, so that no pair can be computed.
 
     Args:
         matching: how.
-        watcher: see there.
+        watcher: is told how far it is.
         stages: MATCHING or EACH_STAGE.
         ready: called when both images of a pair are decoded.
     """
@@ -126,7 +131,7 @@ class PairMatcher:
         stages: tuple[str, ...] = MATCHING,
         ready: Callable[[], None] = lambda: None,
     ) -> None:
-        self._matching, self.watcher, self._stages, self._ready = matching, watcher, stages, ready
+        self._matching, self._watcher, self._stages, self._ready = matching, watcher, stages, ready
         self._core: StereoCore | None = None
         self._size_px: Size = (0, 0)
         self.has_no_core = False
@@ -145,7 +150,7 @@ class PairMatcher:
             SettingsError: the core cannot be made so, or its crop lies outside of the images.
         """
         times, about = [now.monotonic_ns()], f" {label}" if label else ""
-        self.watcher.say(f"reading{about}")
+        self._watcher.say(f"reading{about}")
         limit, (of_left, of_right) = self._matching.most_pixels, self._matching.mounted
         opened = open_image(left, limit, of_left), open_image(right, limit, of_right)
         core = self._core_for(*opened)
@@ -159,7 +164,7 @@ class PairMatcher:
         def clock() -> int:
             """Tell the time to the core, which asks for it at the start of each stage."""
             if (stage := next(stages, None)) is not None:
-                self.watcher.say(f"{stage}{about}")
+                self._watcher.say(f"{stage}{about}")
             return now.monotonic_ns()
 
         processed = core.compute(*images, clock, whole_px=whole_px)
@@ -186,56 +191,64 @@ class PairMatcher:
 
 def compute_pairs(
     pairs: FilePairs,
-    matcher: PairMatcher,
-    done: list[T | FailedPair],
+    watcher: Watcher,
     take: Callable[[ComputedPair], T],
+    finish: Callable[[list[T | FailedPair]], R],
+    keep: Callable[[list[T | FailedPair]], None],
     *,
-    label: Callable[[int, str, Path], str],
+    label: Callable[[int, str, Path], str] = lambda _number, name, _left: name,
     spared: type[DataError] | tuple[type[DataError], type[SettingsError]] = DataError,
     known: Mapping[str, T] | None = None,
     after: Callable[[], None] = lambda: None,
-) -> None:
+    stages: tuple[str, ...] = MATCHING,
+    ready: Callable[[], None] = lambda: None,
+) -> R:
     """Compute all pairs.
 
     Args:
         pairs: the files.
-        matcher: matches them.
-        done: receives what came of each.
-        take: makes that of a matched pair.
+        watcher: is told how far it is.
+        take: makes what comes of a matched pair.
+        finish: makes what comes of all, in order.
+        keep: writes what has come so far: Ctrl-C or a lack of memory ends the work before it is finished.
         label: gives a pair its name in messages, by its number, its name and its left file.
         spared: errors that cost only their own pair; with a single pair, all are raised.
         known: what came of pairs of an earlier run, by name: they are not computed again.
         after: called after each pair that was computed.
+        stages: see `PairMatcher`.
+        ready: likewise.
 
     Raises:
         DataError: none could be computed.
         SettingsError: the core cannot be made so.
     """
     keep_freed_memory()
-    for number, (name, left, right) in enumerate(pairs.files.pairs):
-        called = label(number, name, left)
-        if known and name in known:
-            done.append(known[name])
-        else:
-            try:
-                with noted_if_out_of_memory(f"{left} and {right}"):
-                    done.append(take(matcher.match(left, right, called, number)))
-                    after()  # an interrupt here finds the pair among those that are done
-            except spared as error:
-                if matcher.has_no_core or len(pairs.files.pairs) == 1:
-                    raise
-                done.append(
-                    FailedPair(
-                        name=called,
-                        left=str(left),
-                        right=str(right),
-                        failure=Diagnostic(error.problem, error.remedy, Severity.FAIL),
-                    )
-                )
-        matcher.watcher()
-    failed = [pair for pair in done if isinstance(pair, FailedPair)]
-    if len(failed) == len(done):
-        raise failed[0].none_of(len(done))
+    done, is_only = list[T | FailedPair](), len(pairs.files.pairs) == 1
+
+    def compute() -> None:  # a frame of its own: when it ends, the core's memory is free
+        matcher = PairMatcher(pairs, watcher, stages, ready)
+        for number, (name, left, right) in enumerate(pairs.files.pairs):
+            called = label(number, name, left)
+            if known and name in known:
+                done.append(known[name])
+            else:
+                try:
+                    with noted_if_out_of_memory(f"{left} and {right}"):
+                        done.append(take(matcher.match(left, right, called, number)))
+                        after()  # an interrupt here finds the pair among those that are done
+                except spared as error:
+                    if matcher.has_no_core or is_only:
+                        raise
+                    failure = Diagnostic(error.problem, error.remedy, Severity.FAIL)
+                    done.append(FailedPair(name=called, left=str(left), right=str(right), failure=failure))
+            watcher()
+        failed = [pair for pair in done if isinstance(pair, FailedPair)]
+        if len(failed) == len(done):
+            raise failed[0].none_of(len(done))
+
+    with kept_if_interrupted(lambda: keep(done)):
+        compute()
+        return finish(done)
 
 
 def sound_pair(

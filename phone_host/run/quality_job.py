@@ -4,7 +4,7 @@ A pair that cannot be computed ends the work only if it is the only one. One tha
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -25,9 +25,8 @@ from phone_host.report.quality_json import quality_json
 from phone_host.report.quality_page import quality_page
 from phone_host.report.quality_report import MeasuredPair, QualityReport
 from phone_host.report.stereo_report import ALWAYS, FailedPair, Size
-from phone_host.run.file_pairs import ComputedPair, FilePairs, PairMatcher, Watcher, compute_pairs
-from phone_host.run.kept import kept_if_interrupted
-from phone_host.run.stereo_remarks import files_remarks, judge_pair, turned_remarks
+from phone_host.run.file_pairs import ComputedPair, FilePairs, Watcher, compute_pairs
+from phone_host.run.stereo_remarks import judge_pair, turned_remarks
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import crop_inside
 from phone_host.stereo.images import size_px
@@ -75,19 +74,19 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
         UnavailableError: a file in the results folder was not written by this program.
         OSError: the results cannot be written.
     """
-    pairs, done = job.pairs, list[MeasuredPair | FailedPair]()
+    pairs = job.pairs
 
-    def report() -> QualityReport:
+    def report(done: Sequence[MeasuredPair | FailedPair]) -> QualityReport:
         return QualityReport(
             pairs=tuple(done),
             matcher=pairs.matcher,
             left_alone=tuple(map(str, pairs.files.left_alone)),
             right_alone=tuple(map(str, pairs.files.right_alone)),
-            remarks=files_remarks(pairs.files, pairs.matcher_note),
+            remarks=pairs.remarks,
         )
 
-    def write_so_far() -> None:
-        so_far = replace(report(), interrupted_of=len(pairs.files.pairs))
+    def keep(done: Sequence[MeasuredPair | FailedPair]) -> None:
+        so_far = replace(report(done), interrupted_of=len(pairs.files.pairs))
         if so_far.measured:
             _write(pairs.out, so_far, lambda place: pairs.tell_of_partial(place, len(done)))
 
@@ -95,9 +94,7 @@ def run_quality(job: QualityJob, watcher: Watcher) -> QualityReport:
         watcher.say(f"measuring {pair.label}")
         return _measured(job, pair)
 
-    with kept_if_interrupted(write_so_far):
-        compute_pairs(pairs, PairMatcher(pairs, watcher), done, take, label=lambda _number, _name, left: left.name)
-    whole = report()
+    whole = compute_pairs(pairs, watcher, take, report, keep, label=lambda _number, _name, left: left.name)
     _write(pairs.out, whole)
     return whole
 

@@ -26,11 +26,11 @@ from phone_host.report.scan_next import next_commands
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import MODEL, TRAJECTORY, ScanReport
 from phone_host.report.stereo_report import ALWAYS, FailedPair
-from phone_host.run.file_pairs import ComputedPair, FilePairs, PairMatcher, Watcher, compute_pairs
-from phone_host.run.kept import kept_if_interrupted, tell_if_heard
+from phone_host.run.file_pairs import ComputedPair, FilePairs, Watcher, compute_pairs
+from phone_host.run.kept import tell_if_heard
 from phone_host.run.kept_submaps import KeptSubmaps
 from phone_host.run.scan_result import field_of_turn, report_of, require_something, turn_remarks, unused_mat
-from phone_host.run.stereo_remarks import files_remarks, judge_pair
+from phone_host.run.stereo_remarks import judge_pair
 from phone_host.scan.field_bytes import KeptField, field_of
 from phone_host.scan.mat import MatInView
 from phone_host.scan.scan import Scan, scan_for
@@ -231,7 +231,7 @@ def run_scan(
             "there is only one pair: a scan puts views from several places together",
             "take more of them, each sharing most of what the last one shows; for one pair there is `phone-host stereo`",
         )
-    work, done = ScanWork(wanted, pairs.out, resumed, pairs.tell), list[ScannedPair | FailedPair]()
+    work = ScanWork(wanted, pairs.out, resumed, pairs.tell)
     doubts: dict[str, Diagnostic] = {}
     is_judged = False
 
@@ -248,17 +248,16 @@ def run_scan(
             watcher.say(f"{name}: {scanned.weakness.advice}")
         return scanned
 
-    def finished() -> FinishedScan:
-        remarks = (*doubts.values(), *files_remarks(pairs.files, pairs.matcher_note))
-        return work.finished(remarks, done, matcher=pairs.matcher, axes=axes)
+    def finished(done: Sequence[ScannedPair | FailedPair]) -> FinishedScan:
+        return work.finished((*doubts.values(), *pairs.remarks), done, matcher=pairs.matcher, axes=axes)
 
-    def write_so_far() -> None:
+    def keep(done: Sequence[ScannedPair | FailedPair]) -> None:
         if work.scan.fused:
             goes_on = "" if wanted.turntable else f"; --resume {pairs.out} goes on with it"
             tell_if_heard(
                 pairs.tell, f"stopped after {len(done)} of {counted(count, 'pair')}: writing their model{goes_on}"
             )
-            so_far = finished()  # first, for it makes the field whole where a loop was just moving it
+            so_far = finished(done)  # first, for it makes the field whole where a loop was just moving it
             work.kept.before_end()
             write_scan(
                 pairs.out,
@@ -266,17 +265,11 @@ def run_scan(
                 lambda place: pairs.tell_of_partial(place, len(done)),
             )
 
-    with kept_if_interrupted(write_so_far):
-        compute_pairs(
-            pairs,
-            PairMatcher(pairs, watcher),
-            done,
-            take,
-            label=lambda _number, name, _left: name,
-            known={pair.name: pair for pair in work.scan.pairs},
-            after=work.kept.after_pair,
-        )
+    def finish(done: Sequence[ScannedPair | FailedPair]) -> FinishedScan:
         watcher.say("making the surface")
-        whole = finished()
+        return finished(done)
+
+    known = {pair.name: pair for pair in work.scan.pairs}
+    whole = compute_pairs(pairs, watcher, take, finish, keep, known=known, after=work.kept.after_pair)
     work.write(whole)
     return whole.report

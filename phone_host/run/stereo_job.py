@@ -16,7 +16,6 @@ from typing import Final
 from common import now
 from common.errors import DataError, SettingsError
 from common.imagesize.head import size_text
-from common.program.out_of_memory import noted_if_out_of_memory
 from common.words import distance_text
 from phone_host.calibration.drift.see import StillsWatch
 from phone_host.model import Processed
@@ -45,9 +44,8 @@ from phone_host.report.stereo_report import (
     pair_verdict,
     set_verdict,
 )
-from phone_host.run.file_pairs import EACH_STAGE, ComputedPair, FilePairs, PairMatcher, Watcher, compute_pairs
-from phone_host.run.kept import keep_freed_memory, kept_if_interrupted
-from phone_host.run.stereo_remarks import drift_remarks, files_remarks, judge_pair, pair_remarks, turned_remarks
+from phone_host.run.file_pairs import EACH_STAGE, ComputedPair, FilePairs, Watcher, compute_pairs
+from phone_host.run.stereo_remarks import drift_remarks, judge_pair, pair_remarks, turned_remarks
 from phone_host.stereo.evidence import density, look_at, maps_of
 from phone_host.stereo.images import size_px
 
@@ -169,6 +167,7 @@ def run_stereo(
     """
     count = len(pairs.files.pairs)
     with closing(ListedFolder(pairs.out, NAMES, command="stereo")) as results:
+        work = _Writing(pairs, results, watcher, axes, commands)
 
         def open_results() -> None:
             if results.descriptor < 0:
@@ -176,33 +175,31 @@ def run_stereo(
                 if count == 1 or results.earlier:
                     results.stage()
 
-        matcher = PairMatcher(pairs, watcher, EACH_STAGE, open_results)
-        work = _Writing(pairs, results, watcher, axes, commands)
-        if count == 1:
-            keep_freed_memory()
-            _, left, right = pairs.files.pairs[0]
-            with noted_if_out_of_memory(f"{left} and {right}"):
-                work.done.append(work.written(matcher.match(left, right)))
-            results.publish()
-            return work.report()
-
-        def write_so_far() -> None:
-            so_far = replace(work.report(), interrupted_of=count)
-            if so_far.computed:
+        def keep(done: Sequence[PairReport | FailedPair]) -> None:
+            so_far = replace(work.report(done), interrupted_of=count)
+            if count > 1 and so_far.computed:
                 work.write(so_far)
                 if results.earlier:
-                    pairs.tell_of_partial(results.keep_staged(), len(work.done))
+                    pairs.tell_of_partial(results.keep_staged(), len(done))
                 else:
                     results.publish()
 
         def label(number: int, name: str, _: Path) -> str:
-            return f"pair-{int(name) if pairs.files.by_number else number:06d}"
+            return "" if count == 1 else f"pair-{int(name) if pairs.files.by_number else number:06d}"
 
-        with kept_if_interrupted(write_so_far):
-            spared = DataError, SettingsError  # such as a --crop that lies outside images of this size
-            compute_pairs(pairs, matcher, work.done, work.written, label=label, spared=spared)
-        report = work.report()
-        work.write(report)
+        report = compute_pairs(
+            pairs,
+            watcher,
+            work.written,
+            work.report,
+            keep,
+            label=label,
+            spared=(DataError, SettingsError),  # such as a --crop that lies outside images of this size
+            stages=EACH_STAGE,
+            ready=open_results,
+        )
+        if count > 1:
+            work.write(report)
         results.publish()
         return report
 
@@ -216,19 +213,17 @@ class _Writing:
         self._pairs, self._results, self._watcher, self._axes, self._commands = pairs, results, watcher, axes, commands
         self._rig = StillsWatch()
         self._thumbnails: dict[str, Picture] = {}
-        self.done: list[PairReport | FailedPair] = []
 
-    def report(self) -> SetReport:
+    def report(self, done: Sequence[PairReport | FailedPair]) -> SetReport:
         """Return that of the pairs so far."""
         files, drift = self._pairs.files, None if len(self._pairs.files.pairs) == 1 else self._rig.drift
-        remarks = (*files_remarks(files, self._pairs.matcher_note), *drift_remarks(drift))
         return SetReport(
-            pairs=tuple(self.done),
+            pairs=tuple(done),
             by_number=files.by_number,
             by_name=files.by_name,
             left_alone=tuple(map(str, files.left_alone)),
             right_alone=tuple(map(str, files.right_alone)),
-            remarks=() if len(self.done) == 1 else remarks,
+            remarks=() if len(done) == 1 else (*self._pairs.remarks, *drift_remarks(drift)),
             drift=drift,
         )
 
@@ -274,7 +269,7 @@ class _Writing:
             remarks = [
                 *turned_remarks(*pair.opened),
                 *pair_remarks(processed, trust, core.wanted.search_from_m),
-                *(() if folder else files_remarks(self._pairs.files, self._pairs.matcher_note)),
+                *(() if folder else self._pairs.remarks),
             ]
             report = PairReport(
                 name=folder,
