@@ -21,8 +21,7 @@ from common.protocol.message import Pacing
 from phone_host.accounts.link_account import LinkAccount
 from phone_host.bench.cases import BOARD_SETS, Case, Interface, Size
 from phone_host.bench.emulate import NOTHING
-from phone_host.bench.relay import RelayProcess, relay_process
-from phone_host.report.bench_result import RelayAccount
+from phone_host.bench.relay import RelayAccount, RelayProcess, relay_process
 from phone_host.stream.await_board import BoardPatience, await_board
 from phone_host.stream.frame_sink import NoFrames
 from phone_host.stream.receiver import Receiver

@@ -17,7 +17,7 @@ import sys
 import tty
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
@@ -25,7 +25,6 @@ from common import now
 from common.errors import UnavailableError
 from common.program.signals import StopSignals
 from phone_host.bench.emulate import SEGMENT_BYTES, Profile, Way
-from phone_host.report.bench_result import RelayAccount
 from phone_host.subprocesses.child_process import GOODBYE_S, child_process
 
 _SOCKET_BUFFER_BYTES: Final = 16 * 1024
@@ -37,6 +36,17 @@ _QUANTUM_BYTES: Final = 16 * 1024
 
 _DIAL_AGAIN_NS: Final = 100_000_000
 """While the board is not there, the host's connections wait unaccepted. If one were accepted and closed, the host would see a peer that hangs up."""
+
+
+@dataclass(frozen=True, slots=True)
+class RelayAccount:
+    """What the process that emulated a line reports when it ends; bytes lost and stalls are of both directions."""
+
+    to_host_bytes: int
+    to_board_bytes: int
+    lost_bytes: int
+    stalls: int
+    cpu_s: float
 
 
 class _End:

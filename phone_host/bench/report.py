@@ -1,9 +1,12 @@
-"""The delay benchmark's measurements as a JSON object. Every key names its number's unit."""
+"""The delay benchmark's measurements as a JSON object: its keys are the fields of these classes, each with its number's unit.
+
+Times are over the pairs after the warm-up, counts of the whole run.
+"""
 
 import math
 import os
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,33 +15,200 @@ import zmq
 from common import now
 from common.words import counted
 from phone_host.accounts.delays import DELAYS, STAGES, Spread
-from phone_host.bench.analysis import Analysis, Checked, Errors, InterfaceFit, regime_of, statistics_of
+from phone_host.bench.analysis import Analysis, Checked, Errors, WhatIf, regime_of, statistics_of
 from phone_host.bench.cases import BOARD_SETS, Interface
 from phone_host.bench.delay_fit import DelayFit
 from phone_host.bench.prediction import Figures, Unknown
+from phone_host.bench.relay import RelayAccount
 from phone_host.bench.runs import WARM_UP_S, CaseResult, RunSettings
-from phone_host.report.bench_result import (
-    BenchRun,
-    BothErrors,
-    DelayBenchResult,
-    DelaySpread,
-    FittedLink,
-    NotRun,
-    NotRunSetting,
-    Predicted,
-    PredictionErrors,
-    RegimeTold,
-    RunCounts,
-    RunFigures,
-    UncertaintySpread,
-)
-from phone_host.report.json_result import ABSENT, Absent, json_values
+from phone_host.diagnostics.throughput import Judgement
+from phone_host.report.json_result import ABSENT, Absent, FieldOf, Number, json_values, made
 from phone_host.sync.fifo import FifoSettings
 
 PERCENTILES: Final = ("p50", "p95", "p99", "max")
 
 ENOUGH_PAIRS: Final = 50
 """With fewer pairs, a run's 95th percentile rests on its slowest two, and its median on what the machine did in that moment."""
+
+_spread, _result, _fit, _errors = FieldOf[Spread](), FieldOf[CaseResult](), FieldOf[DelayFit](), FieldOf[Errors]()
+_figures, _checked, _what_if = FieldOf[Figures](), FieldOf[Checked](), FieldOf[WhatIf]()
+
+
+@dataclass(frozen=True, slots=True)
+class DelaySpread:
+    """The distribution of a delay over the pairs of a run."""
+
+    p50_ms: Number = _spread(lambda spread: spread.p50_ns / 1e6)
+    p95_ms: Number = _spread(lambda spread: spread.p95_ns / 1e6)
+    p99_ms: Number = _spread(lambda spread: spread.p99_ns / 1e6)
+    max_ms: Number = _spread(lambda spread: spread.max_ns / 1e6)
+    mean_ms: Number = _spread(lambda spread: spread.mean_ns / 1e6)
+
+
+@dataclass(frozen=True, slots=True)
+class UncertaintySpread:
+    """The distribution of the clock's uncertainty over the pairs of a run."""
+
+    p50_us: Number = _spread(lambda spread: spread.p50_ns / 1e3)
+    p95_us: Number = _spread(lambda spread: spread.p95_ns / 1e3)
+    p99_us: Number = _spread(lambda spread: spread.p99_ns / 1e3)
+    max_us: Number = _spread(lambda spread: spread.max_ns / 1e3)
+    mean_us: Number = _spread(lambda spread: spread.mean_ns / 1e3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunCounts:
+    """What became of every frame and pair of a run; some by reason."""
+
+    grabbed_frames: int = _result(lambda result: result.board.grabbed)
+    dropped_on_board_frames: Mapping[str, int] = _result(lambda result: dict(result.board.dropped))
+    sent_frames: int = _result(lambda result: result.board.sent)
+    lost_on_link_frames: int = _result(lambda result: sum(each.lost for each in result.link.sessions))
+    under_way_at_end_frames: int = _result(
+        lambda result: result.board.sent - sum(each.received + each.lost for each in result.link.sessions)
+    )
+    received_frames: int = _result(lambda result: sum(each.received for each in result.link.sessions))
+    before_clock_frames: int = _result(lambda result: result.link.no_clock)
+    disbelieved_frames: Mapping[str, int] = _result(
+        lambda result: {reason.value: count for reason, count in result.link.disbelieved.items()}
+    )
+    orphaned_frames: Mapping[str, int] = _result(lambda result: dict(result.counts.board_orphans))
+    held_at_end_frames: int = _result(lambda result: result.counts.held_board)
+    paired_pairs: int = _result(lambda result: result.counts.paired)
+    dropped_in_fifo_pairs: int = _result(lambda result: result.counts.dropped)
+    undecodable_pairs: int = _result(lambda result: result.undecodable)
+    processed_pairs: int = _result(lambda result: result.processed)
+    not_processed_at_end_pairs: int = _result(
+        lambda result: result.counts.paired - result.counts.dropped - result.undecodable - result.processed
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BenchRun:
+    """One run; without a JPEG quality the camera's images are sent as they are."""
+
+    link: str = _result(lambda result: result.case.interface.link)
+    emulated: str | None
+    width_px: int
+    height_px: int
+    jpeg_quality_percent: int | None
+    camera_rate_hz: int = _result(lambda result: result.case.rate_hz)
+    pair_rate_hz: Number = _result(lambda result: result.pairs_per_second)
+    measured_s: float
+    measured_pairs: int = _result(lambda result: len(result.ledgers))
+    mean_frame_bytes: int = _result(
+        lambda result: round(sum(ledger.bytes for ledger in result.ledgers) / max(1, len(result.ledgers)))
+    )
+    least_frame_bytes: int = _result(lambda result: min((ledger.bytes for ledger in result.ledgers), default=0))
+    delays: Mapping[str, DelaySpread]
+    stages: Mapping[str, DelaySpread]
+    time_skew: DelaySpread
+    clock_uncertainty: UncertaintySpread
+    clock_uncertainty_at_end_us: Number = _result(lambda result: result.uncertainty_ns / 1e3)
+    clock_bound_at_end_us: Number = _result(lambda result: result.bound_ns / 1e3)
+    regime: Judgement
+    whole_run: RunCounts = _result(lambda result: made(RunCounts, result))
+    line: RelayAccount | None = _result(lambda result: result.relay)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FittedLink:
+    """Latency and rate of a link with their 95 % intervals; JSON has no number for an infinite rate, the slope says what was found."""
+
+    link: str
+    fitted_frames: int = _fit(lambda fit: fit.points)
+    latency_ms: Number = _fit(lambda fit: fit.latency_ns / 1e6)
+    latency_low_ms: Number = _fit(lambda fit: fit.latency_low_ns / 1e6)
+    latency_high_ms: Number = _fit(lambda fit: fit.latency_high_ns / 1e6)
+    slope_ns_per_byte: Number = _fit(lambda fit: fit.ns_per_byte)
+    slope_low_ns_per_byte: Number = _fit(lambda fit: fit.slope_low)
+    slope_high_ns_per_byte: Number = _fit(lambda fit: fit.slope_high)
+    typical_error_ms: Number = _fit(lambda fit: fit.typical_error_ns / 1e6)
+    rate_bytes_per_s: Number = _fit(lambda fit: fit.bytes_per_s)
+    rate_low_bytes_per_s: Number = _fit(lambda fit: fit.least_bytes_per_s)
+    rate_high_bytes_per_s: Number = _fit(lambda fit: fit.most_bytes_per_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunFigures:
+    """The figures of a run that are compared with their prediction."""
+
+    pair_rate_hz: Number = _figures(lambda figures: figures.pairs_per_s)
+    lost_percent: Number = _figures(lambda figures: 100.0 * figures.lost_share)
+    propagation_p50_ms: Number = _figures(lambda figures: figures.propagation_p50_ns / 1e6)
+    queuing_p95_ms: Number = _figures(lambda figures: figures.queuing_p95_ns / 1e6)
+    starvation_p50_ms: Number = _figures(lambda figures: figures.starvation_p50_ns / 1e6)
+    end_to_end_p50_ms: Number = _figures(lambda figures: figures.end_to_end_p50_ns / 1e6)
+    end_to_end_p95_ms: Number = _figures(lambda figures: figures.end_to_end_p95_ns / 1e6)
+
+
+@dataclass(frozen=True, slots=True)
+class Predicted:
+    """A run beside its prediction from all others, and from its own link and processing; or why there is none."""
+
+    link: str = _checked(lambda one: str(one.case.interface))
+    images: str = _checked(lambda one: one.case.images)
+    measured: RunFigures = _checked(lambda one: made(RunFigures, one.measured))
+    queues_alone: RunFigures | None = _checked(lambda one: _predicted(one.queues))
+    predicted: RunFigures | None = _checked(lambda one: _predicted(one.predicted))
+    reason: str | Absent = _checked(lambda one: _reason(one.predicted))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NotRunSetting:
+    """The prediction for a setting that was not run; or why there is none."""
+
+    link: str = _what_if(lambda one: one.interface)
+    setting: str
+    predicted: RunFigures | None = _what_if(lambda one: _predicted(one.figures))
+    reason: str | Absent = _what_if(lambda one: _reason(one.figures))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictionErrors:
+    """How far predictions were from measurements."""
+
+    predicted_runs: int = _errors(lambda errors: errors.runs)
+    pair_rate_median_percent: Number = _errors(lambda errors: 100.0 * errors.rate)
+    pair_rate_worst_percent: Number = _errors(lambda errors: 100.0 * errors.worst_rate)
+    end_to_end_p50_median_percent: Number = _errors(lambda errors: 100.0 * errors.end_to_end)
+    end_to_end_p50_worst_percent: Number = _errors(lambda errors: 100.0 * errors.worst_end_to_end)
+
+
+@dataclass(frozen=True, slots=True)
+class BothErrors:
+    """Errors of the predictions from the other runs, and of the queues alone."""
+
+    held_out: PredictionErrors
+    queues_alone: PredictionErrors
+
+
+@dataclass(frozen=True, slots=True)
+class NotRun:
+    """An interface that could not be measured, and why."""
+
+    link: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DelayBenchResult:
+    """What delay-bench measured and predicts, and under which conditions."""
+
+    command: str = "delay-bench"
+    recording: str | None
+    machine: str
+    date: str
+    matcher: str
+    measured_per_run_s: float
+    left_out_warm_up_s: float
+    fifo: str
+    runs: tuple[BenchRun, ...]
+    interfaces: tuple[FittedLink, ...]
+    predictions: tuple[Predicted, ...]
+    prediction_errors: BothErrors
+    not_run_settings: tuple[NotRunSetting, ...]
+    not_run: tuple[NotRun, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,21 +251,20 @@ def conditions(settings: RunSettings, not_run: Sequence[tuple[Interface, str]]) 
 def as_json(results: Sequence[CaseResult], under: Conditions, analysis: Analysis) -> dict[str, object]:
     """Make the object of delay-bench.json."""
     return json_values(
-        DelayBenchResult(
+        made(
+            DelayBenchResult,
+            under,
             recording=under.recording or None,
-            machine=under.machine,
-            date=under.date,
-            matcher=under.matcher,
             measured_per_run_s=under.seconds,
             left_out_warm_up_s=WARM_UP_S,
             fifo=f"{under.fifo.depth}:{under.fifo.overflow.value}",
             runs=tuple(_run(result, under.fifo) for result in results),
-            interfaces=tuple(_interface(one) for one in analysis.fits),
-            predictions=tuple(_checked(one) for one in analysis.checked),
-            prediction_errors=BothErrors(_errors(analysis.held_out), _errors(analysis.queues)),
-            not_run_settings=tuple(
-                NotRunSetting(one.interface, one.setting, *_figures_or_reason(one.figures)) for one in analysis.what_ifs
+            interfaces=tuple(made(FittedLink, one.fit, link=str(one.interface)) for one in analysis.fits),
+            predictions=made(Predicted, analysis.checked),
+            prediction_errors=BothErrors(
+                made(PredictionErrors, analysis.held_out), made(PredictionErrors, analysis.queues)
             ),
+            not_run_settings=made(NotRunSetting, analysis.what_ifs),
             not_run=tuple(NotRun(str(interface), reason) for interface, reason in under.not_run),
         )
     )
@@ -143,56 +312,6 @@ def few_pairs_words(results: Sequence[CaseResult]) -> str:
     return f"{least.case.interface} from only {counted(pairs, 'pair')}: run it longer (--seconds {seconds})"
 
 
-def _run(result: CaseResult, fifo: FifoSettings) -> BenchRun:
-    case, statistics, regime = result.case, statistics_of(result), regime_of(result, fifo)
-    spread = statistics.spread
-    return BenchRun(
-        link=case.interface.link,
-        emulated=case.interface.profile.name if case.interface.profile is not None else None,
-        width_px=case.size.width_px,
-        height_px=case.size.height_px,
-        jpeg_quality_percent=None if case.quality_percent == BOARD_SETS else case.quality_percent,
-        camera_rate_hz=case.rate_hz,
-        pair_rate_hz=result.pairs_per_second,
-        measured_s=result.measured_s,
-        measured_pairs=len(result.ledgers),
-        mean_frame_bytes=round(sum(ledger.bytes for ledger in result.ledgers) / max(1, len(result.ledgers))),
-        least_frame_bytes=min((ledger.bytes for ledger in result.ledgers), default=0),
-        delays={name: DelaySpread(*_in(1e6, spread(name))) for name in DELAYS},
-        stages={name: DelaySpread(*_in(1e6, spread(name))) for name in STAGES},
-        time_skew=DelaySpread(*_in(1e6, spread("time_skew"))),
-        clock_uncertainty=UncertaintySpread(*_in(1e3, spread("uncertainty"))),
-        clock_uncertainty_at_end_us=result.uncertainty_ns / 1e3,
-        clock_bound_at_end_us=result.bound_ns / 1e3,
-        regime=RegimeTold(regime.regime.value, regime.sentence, regime.remedies),
-        whole_run=_counts(result),
-        line=result.relay,
-    )
-
-
-def _counts(result: CaseResult) -> RunCounts:
-    board, counts, link = result.board, result.counts, result.link
-    received = sum(account.received for account in link.sessions)
-    lost = sum(account.lost for account in link.sessions)
-    return RunCounts(
-        grabbed_frames=board.grabbed,
-        dropped_on_board_frames=dict(board.dropped),
-        sent_frames=board.sent,
-        lost_on_link_frames=lost,
-        under_way_at_end_frames=board.sent - received - lost,
-        received_frames=received,
-        before_clock_frames=link.no_clock,
-        disbelieved_frames={reason.value: count for reason, count in link.disbelieved.items()},
-        orphaned_frames=dict(counts.board_orphans),
-        held_at_end_frames=counts.held_board,
-        paired_pairs=counts.paired,
-        dropped_in_fifo_pairs=counts.dropped,
-        undecodable_pairs=result.undecodable,
-        processed_pairs=result.processed,
-        not_processed_at_end_pairs=counts.paired - counts.dropped - result.undecodable - result.processed,
-    )
-
-
 def percentiles(spread: Spread) -> dict[str, float]:
     """Return the percentiles that are reported, by name, and the mean, ns."""
     return {
@@ -204,56 +323,26 @@ def percentiles(spread: Spread) -> dict[str, float]:
     }
 
 
-def _in(unit_ns: float, spread: Spread) -> Iterator[float]:
-    return (value / unit_ns for value in percentiles(spread).values())
-
-
-def _interface(one: InterfaceFit) -> FittedLink:
-    fit: DelayFit = one.fit
-    return FittedLink(
-        link=str(one.interface),
-        fitted_frames=fit.points,
-        latency_ms=fit.latency_ns / 1e6,
-        latency_low_ms=fit.latency_low_ns / 1e6,
-        latency_high_ms=fit.latency_high_ns / 1e6,
-        slope_ns_per_byte=fit.ns_per_byte,
-        slope_low_ns_per_byte=fit.slope_low,
-        slope_high_ns_per_byte=fit.slope_high,
-        typical_error_ms=fit.typical_error_ns / 1e6,
-        rate_bytes_per_s=fit.bytes_per_s,
-        rate_low_bytes_per_s=fit.least_bytes_per_s,
-        rate_high_bytes_per_s=fit.most_bytes_per_s,
+def _run(result: CaseResult, fifo: FifoSettings) -> BenchRun:
+    case, spread = result.case, statistics_of(result).spread
+    run: BenchRun = made(
+        BenchRun,
+        result,
+        case.size,
+        emulated=case.interface.profile.name if case.interface.profile is not None else None,
+        jpeg_quality_percent=None if case.quality_percent == BOARD_SETS else case.quality_percent,
+        delays={name: made(DelaySpread, spread(name)) for name in DELAYS},
+        stages={name: made(DelaySpread, spread(name)) for name in STAGES},
+        time_skew=made(DelaySpread, spread("time_skew")),
+        clock_uncertainty=made(UncertaintySpread, spread("uncertainty")),
+        regime=regime_of(result, fifo),
     )
+    return run
 
 
-def _errors(errors: Errors) -> PredictionErrors:
-    return PredictionErrors(
-        predicted_runs=errors.runs,
-        pair_rate_median_percent=100.0 * errors.rate,
-        pair_rate_worst_percent=100.0 * errors.worst_rate,
-        end_to_end_p50_median_percent=100.0 * errors.end_to_end,
-        end_to_end_p50_worst_percent=100.0 * errors.worst_end_to_end,
-    )
+def _predicted(figures: Figures | Unknown) -> RunFigures | None:
+    return None if isinstance(figures, Unknown) else made(RunFigures, figures)
 
 
-def _checked(one: Checked) -> Predicted:
-    queues, _ = _figures_or_reason(one.queues)
-    return Predicted(
-        str(one.case.interface), one.case.images, _figures(one.measured), queues, *_figures_or_reason(one.predicted)
-    )
-
-
-def _figures_or_reason(predicted: Figures | Unknown) -> tuple[RunFigures | None, str | Absent]:
-    return (None, predicted.reason) if isinstance(predicted, Unknown) else (_figures(predicted), ABSENT)
-
-
-def _figures(figures: Figures) -> RunFigures:
-    return RunFigures(
-        pair_rate_hz=figures.pairs_per_s,
-        lost_percent=100.0 * figures.lost_share,
-        propagation_p50_ms=figures.propagation_p50_ns / 1e6,
-        queuing_p95_ms=figures.queuing_p95_ns / 1e6,
-        starvation_p50_ms=figures.starvation_p50_ns / 1e6,
-        end_to_end_p50_ms=figures.end_to_end_p50_ns / 1e6,
-        end_to_end_p95_ms=figures.end_to_end_p95_ns / 1e6,
-    )
+def _reason(figures: Figures | Unknown) -> str | Absent:
+    return figures.reason if isinstance(figures, Unknown) else ABSENT

@@ -22,9 +22,9 @@ from common.stamp import HOST_CLOCK
 from phone_host.accounts.link_account import LinkAccount
 from phone_host.bench.cases import Case, Size
 from phone_host.bench.links import Ends, open_ends
+from phone_host.bench.relay import RelayAccount
 from phone_host.demo.demonstration import NEAR_M
 from phone_host.model import CameraModel, PairCounts, Result, Rig, StereoGeometry
-from phone_host.report.bench_result import RelayAccount
 from phone_host.run.host import Host
 from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import FunctionSink

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
-from phone_host.report.bench_result import DelayBenchResult
+from phone_host.bench.report import DelayBenchResult
 from phone_host.report.calibration_result import CalibrationResult, ImportResult
 from phone_host.report.json_result import Absent, types_of
 
