@@ -1,10 +1,11 @@
 """How a running rig departs from its calibration, as JSON and as a table of a page. Pure."""
 
 import math
+from dataclasses import dataclass
 
 from phone_host.diagnostics.drift import is_late, turn_words
-from phone_host.model import Change, ChangeKind, Departure, Drift, Turn
-from phone_host.output.json_text import json_number
+from phone_host.model import Change, ChangeKind, Departure, Drift, DriftState, Trend, Turn
+from phone_host.report.json_result import ABSENT, D3, Absent, FieldOf, Number, made
 from phone_host.report.report_page import Table
 
 _WORDS = {
@@ -14,64 +15,90 @@ _WORDS = {
     ChangeKind.BEYOND: "too far to be corrected",
 }
 
+_departure, _change, _trend, _drift = FieldOf[Departure](), FieldOf[Change](), FieldOf[Trend](), FieldOf[Drift]()
 
-def drift_values(drift: Drift | None) -> dict[str, object] | None:
-    """Return the object `drift` of report.json; None without a rig."""
-    if drift is None:
-        return None
-    trend = drift.trend
-    return {
-        **_standing(drift),
-        "focal_sigma_percent": json_number(100 * drift.focal_sigma),
-        "overlay": _departure(drift.overlay),
-        "zero_sigma_px": json_number(drift.zero_sigma_px),
-        "features": drift.features,
-        "pairs_used": drift.measurements,
-        "pairs_judged": drift.judged,
-        "trend": {
-            "seconds": json_number(trend.seconds),
-            "turn_deg_per_min": _degrees(trend.turn_rad_s, 60.0),
-            "turn_sigma_deg_per_min": _degrees(trend.sigma_rad_s, 60.0),
-            "vertical_error_px_per_min": json_number(60 * trend.rows_px_s),
-        },
-        "late_left_ms": json_number(drift.late_ns / 1e6),
-        "late_sigma_ms": json_number(drift.late_sigma_ns / 1e6),
-        "is_late": is_late(drift),
-        "changes": [_change(change) for change in drift.changes],
-    }
+Degrees = tuple[Number, ...]
+"""Pitch, yaw and roll: about the right camera's x, y and z axis."""
 
 
-def stills_drift_values(drift: Drift | None) -> dict[str, object] | None:
-    """Return the object `drift` of `stereo`'s report.json for several pairs; None without a rig.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DepartureResult:
+    """How the right camera departs from its calibration."""
 
-    Args:
-        drift: of the pairs, with their numbers, from 1 on, for seconds.
-    """
-    if drift is None:
-        return None
-    trend = drift.trend
-    return {
-        **_standing(drift),
-        "pairs_judged": drift.judged,
-        "trend": {
-            "turn_deg_per_pair": _degrees(trend.turn_rad_s),
-            "turn_sigma_deg_per_pair": _degrees(trend.sigma_rad_s),
-            "vertical_error_px_per_pair": json_number(trend.rows_px_s),
-        },
-        "knocked_at_pair": [round(change.at_s) for change in drift.changes if change.kind is ChangeKind.KNOCKED],
-    }
+    turn_deg: Degrees = _departure(lambda departure: _degrees(departure.turn_rad))
+    focal_percent: Number = _departure(lambda departure: 100 * (departure.focal - 1))
 
 
-def _standing(drift: Drift) -> dict[str, object]:
-    """What is said of the rig in every report: how it stands, and what that does to its rows."""
-    return {
-        "state": drift.state.value,
-        "departure": _departure(drift.departure),
-        "turn_sigma_deg": _degrees(drift.turn_sigma_rad),
-        "vertical_error_px": json_number(drift.rows_px),
-        "vertical_error_sigma_px": json_number(drift.rows_sigma_px),
-        "vertical_error_left_px": json_number(drift.left_px),
-    }
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Standing:
+    """How a rig stands, and what that does to its rows."""
+
+    state: DriftState
+    departure: DepartureResult = _drift(lambda drift: made(DepartureResult, drift.departure))
+    turn_sigma_deg: Degrees = _drift(lambda drift: _degrees(drift.turn_sigma_rad))
+    vertical_error_px: Number = _drift(lambda drift: drift.rows_px)
+    vertical_error_sigma_px: Number = _drift(lambda drift: drift.rows_sigma_px)
+    vertical_error_left_px: Number = _drift(lambda drift: drift.left_px)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunTrend:
+    """How the departure moves while a run goes on."""
+
+    seconds: Number
+    turn_deg_per_min: Degrees = _trend(lambda trend: _degrees(trend.turn_rad_s, 60.0))
+    turn_sigma_deg_per_min: Degrees = _trend(lambda trend: _degrees(trend.sigma_rad_s, 60.0))
+    vertical_error_px_per_min: Number = _trend(lambda trend: 60 * trend.rows_px_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeResult:
+    """What happened to a rig."""
+
+    what: ChangeKind = _change(lambda change: change.kind)
+    at_s: D3
+    departure: DepartureResult = _change(lambda change: made(DepartureResult, change.departure))
+    step: DepartureResult | Absent = _change(
+        lambda change: made(DepartureResult, change.step) if change.kind is ChangeKind.KNOCKED else ABSENT
+    )
+    away_s: D3 | Absent = _change(lambda change: change.away_s if change.kind is ChangeKind.RETURNED else ABSENT)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunDrift(Standing):
+    """How a running rig departs from its calibration."""
+
+    focal_sigma_percent: Number = _drift(lambda drift: 100 * drift.focal_sigma)
+    overlay: DepartureResult = _drift(lambda drift: made(DepartureResult, drift.overlay))
+    zero_sigma_px: Number
+    features: int
+    pairs_used: int = _drift(lambda drift: drift.measurements)
+    pairs_judged: int = _drift(lambda drift: drift.judged)
+    trend: RunTrend = _drift(lambda drift: made(RunTrend, drift.trend))
+    late_left_ms: Number = _drift(lambda drift: drift.late_ns / 1e6)
+    late_sigma_ms: Number = _drift(lambda drift: drift.late_sigma_ns / 1e6)
+    is_late: bool = _drift(is_late)
+    changes: tuple[ChangeResult, ...] = _drift(lambda drift: made(ChangeResult, drift.changes))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StillsTrend:
+    """How the departure moves from pair to pair."""
+
+    turn_deg_per_pair: Degrees = _trend(lambda trend: _degrees(trend.turn_rad_s))
+    turn_sigma_deg_per_pair: Degrees = _trend(lambda trend: _degrees(trend.sigma_rad_s))
+    vertical_error_px_per_pair: Number = _trend(lambda trend: trend.rows_px_s)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StillsDrift(Standing):
+    """The same over pairs of image files; their numbers, from 1 on, stand for seconds."""
+
+    pairs_judged: int = _drift(lambda drift: drift.judged)
+    trend: StillsTrend = _drift(lambda drift: made(StillsTrend, drift.trend))
+    knocked_at_pair: tuple[int, ...] = _drift(
+        lambda drift: tuple(round(each.at_s) for each in drift.changes if each.kind is ChangeKind.KNOCKED)
+    )
 
 
 def drift_table(drift: Drift | None) -> tuple[Table, ...]:
@@ -89,26 +116,5 @@ def drift_table(drift: Drift | None) -> tuple[Table, ...]:
     return (Table("The rig while it ran", ("when", "what", "right camera against its calibration"), rows),)
 
 
-def _change(change: Change) -> dict[str, object]:
-    values: dict[str, object] = {
-        "what": change.kind.value,
-        "at_s": round(change.at_s, 3),
-        "departure": _departure(change.departure),
-    }
-    if change.kind is ChangeKind.KNOCKED:
-        values["step"] = _departure(change.step)
-    if change.kind is ChangeKind.RETURNED:
-        values["away_s"] = round(change.away_s, 3)
-    return values
-
-
-def _departure(departure: Departure) -> dict[str, object]:
-    return {
-        "turn_deg": _degrees(departure.turn_rad),
-        "focal_percent": json_number(100 * (departure.focal - 1)),
-    }
-
-
-def _degrees(turn: Turn, times: float = 1.0) -> list[float | None]:
-    """Pitch, yaw and roll: about the right camera's x, y and z axis."""
-    return [json_number(math.degrees(angle) * times) for angle in turn]
+def _degrees(turn: Turn, times: float = 1.0) -> tuple[float, ...]:
+    return tuple(math.degrees(angle) * times for angle in turn)

@@ -18,6 +18,7 @@ D1 = Annotated[float, 1]
 D2 = Annotated[float, 2]
 D3 = Annotated[float, 3]
 D4 = Annotated[float, 4]
+D5 = Annotated[float, 5]
 D6 = Annotated[float, 6]
 """Numbers that are written with so many decimals."""
 

@@ -1,10 +1,12 @@
 """Says what became of a left image's pixels, how many have a point and why the others have none, and what a matcher corrected: to programs, and in plain words. Pure."""
 
 import math
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 from common.words import distance_text
 from phone_host.model import CutCounts, DepthLimits, Epipolar, MatchReport, Search, StereoGeometry
+from phone_host.report.json_result import D2, D3, D4
 
 _TOLD_PX: Final = 0.25
 """From this vertical error on, matching without the correction would be measurably worse."""
@@ -19,19 +21,16 @@ _MIDDLE: Final = 128.0
 """Grey level at which brightness is told."""
 
 
-def corrected_values(report: MatchReport | None) -> dict[str, Any] | None:
-    """Make the object `corrected` of report.json; None if nothing is known."""
-    if report is None:
-        return None
-    counts = report.confidence_histogram
-    return {
-        "vertical_px": round(report.vertical_px, 3),
-        "gain": round(report.gain, 4),
-        "offset_levels": round(report.offset_levels, 2),
-        "vignetting_percent": round(report.vignetting_percent, 2),
-        "shading_percent": round(report.shading_percent, 2),
-        "confidence_histogram": None if counts is None else list(counts),
-    }
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Corrected:
+    """What a matcher corrected before, for report.json."""
+
+    vertical_px: D3
+    gain: D4
+    offset_levels: D2
+    vignetting_percent: D2
+    shading_percent: D2
+    confidence_histogram: tuple[int, ...] | None
 
 
 def corrected_words(report: MatchReport | None, epipolar: Epipolar = Epipolar.LEFT) -> str:

@@ -10,15 +10,16 @@ from phone_host.accounts.delays import DELAYS, FROM_EXPOSURE, STAGES, ReplayFact
 from phone_host.accounts.link_account import LinkTally, rung_values
 from phone_host.diagnostics.headline import headline
 from phone_host.diagnostics.image_judge import Episode, saved_pairs, told_past
-from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.diagnostics.run_rules import concerns, history
 from phone_host.diagnostics.run_snapshot import TIMELESS, RecordingAccount, RunSnapshot, disbelieved, unused
 from phone_host.diagnostics.throughput import Judgement, figures, judge
 from phone_host.model import DepthAccount, TimeOffset
 from phone_host.output.json_text import json_number
 from phone_host.report.budget_report import budget_values
-from phone_host.report.drift_report import drift_values
-from phone_host.report.match_words import corrected_values
+from phone_host.report.drift_report import RunDrift
+from phone_host.report.json_result import result_values
+from phone_host.report.match_words import Corrected
+from phone_host.report.stereo_trust import Doubt, ImagesResult
 from phone_host.sync.fifo import Overflow
 
 _MS: Final = 1e6
@@ -55,7 +56,7 @@ def build(run: RunSnapshot, command: str = "run") -> dict[str, object]:
         "depth": _depth(run.depth),
         "matcher_note": run.matcher_note or None,
         "budget": budget_values(run.budget),
-        "drift": drift_values(run.drift),
+        "drift": result_values(RunDrift, run.drift),
         "regime": _regime(judge(figures(run))),
         "image_motion_px_per_s": json_number(run.motion_px_s),
         "trust": _trust(run),
@@ -161,8 +162,8 @@ def _depth(depth: DepthAccount) -> dict[str, object] | None:
     return {
         "scale": None if depth.search is None else round(depth.search.scale, 4),
         "disparities": None if depth.search is None else depth.search.disparities or None,
-        "corrected": corrected_values(depth.match_report),
-        "corrected_median": corrected_values(depth.median_report),
+        "corrected": result_values(Corrected, depth.match_report),
+        "corrected_median": result_values(Corrected, depth.median_report),
         "limits": None if depth.limits is None else asdict(depth.limits),
         "cut": asdict(depth.cut),
     }
@@ -174,12 +175,12 @@ def _trust(run: RunSnapshot) -> dict[str, object]:
     return {
         "grade": said.grade.value,
         "headline": said.sentence,
-        "doubts": [concern_values(item) for item in concerns(run)],
+        "doubts": [result_values(Doubt, item) for item in concerns(run)],
         "wants_depth": images.wants_depth,
         "has_depth": images.has_depth,
         "judged_pairs": images.judged,
-        "at_first": figure_values(images.start),
-        "now": figure_values(images.now),
+        "at_first": result_values(ImagesResult, images.start),
+        "now": result_values(ImagesResult, images.now),
         "history": [_episode(item, run.save_every) for item in history(run)],
     }
 
@@ -188,7 +189,7 @@ def _episode(item: Episode, save_every: int) -> dict[str, object]:
     """Return one while during which a doubt stood, with the numbers of its pairs, counted from 0."""
     saved = saved_pairs(item, save_every)
     return {
-        **concern_values(item.concern),
+        **result_values(Doubt, item.concern),
         "from_s": round(item.from_s, 3),
         "to_s": round(item.to_s, 3),
         "is_over": item.is_over,
@@ -208,27 +209,6 @@ def problem_values(found: Diagnostic | None) -> dict[str, object] | None:
 def recording_values(account: RecordingAccount) -> dict[str, object]:
     """Return what became of a recording."""
     return {**asdict(account), "failure": problem_values(account.failure)}
-
-
-def concern_values(concern: Diagnostic) -> dict[str, object]:
-    """Return a doubt with its sentence, its remedy, and whether it blocks."""
-    return {
-        "doubt": concern.code,
-        "sentence": concern.message,
-        "remedy": concern.remedy,
-        "blocking": concern.is_failure,
-    }
-
-
-def figure_values(figures: ImageFigures) -> dict[str, float | None]:
-    """Return what the images say: shares, px; None where nothing was measured."""
-    return {
-        "density": json_number(figures.density),
-        "consistency": json_number(figures.consistency),
-        "scattered": json_number(figures.scattered_share),
-        "vertical_error_px": json_number(figures.vertical_px),
-        "vertical_offset_px": json_number(figures.vertical_offset_px),
-    }
 
 
 def _sink(sink: SinkAccount) -> dict[str, object]:

@@ -34,23 +34,12 @@ class PairReport:
 
     Attributes:
         name: of its folder; empty for the only pair, whose files lie in the results folder itself.
-        left: the left image file, as it was named.
-        right: the right image file.
-        left_px: size of the left image as matched or rectified from.
-        right_px: the same for the right image.
+        left: the left image file, as it was named; `right` likewise.
+        left_px: size of the left image as matched or rectified from; `right_px` likewise.
         rectified_px: size of the rectified images, and so of the disparity.
-        matcher: its name.
-        search: how the pair was matched.
-        match_report: what the matcher corrected before; None: not known.
         geometry: None: unknown, so there is no cloud.
-        limits: of the cloud; None without one.
-        cut: what became of the pixels; None: not counted.
         density: share of the pixels that have a disparity.
-        axes: of cloud.ply and xyz.pfm.
-        written: the files.
         stages_ms: how long each stage took, and `total`.
-        remarks: what the user must know.
-        trust: how its images were judged.
     """
 
     name: str
@@ -101,14 +90,7 @@ class PairReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailedPair:
-    """A pair that could not be computed.
-
-    Attributes:
-        name: its folder would have been called so.
-        left: the left image file.
-        right: the right image file.
-        failure: why.
-    """
+    """A pair that could not be computed: what its folder would have been called, its image files, and why."""
 
     name: str
     left: str
@@ -136,9 +118,7 @@ class SetReport:
         pairs: in order; at least one of them was computed.
         by_number: whether the files were paired by the numbers in their names.
         by_name: whether they were paired by equal names; if neither, in name order.
-        left_alone: left images without a partner.
-        right_alone: right images without a partner.
-        remarks: what the user must know about all of them.
+        left_alone: left images without a partner; `right_alone` likewise.
         interrupted_of: how many pairs were to be computed when the command was interrupted; 0: it was not.
         drift: how their rig departs from its calibration, with pairs for seconds; None without a rig.
     """
@@ -177,7 +157,6 @@ class SharedRemark:
     Attributes:
         remark: as the first of them has it.
         pairs: how many have it.
-        first: the first one's name.
         alike: whether all have it word for word.
     """
 

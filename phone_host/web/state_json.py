@@ -15,8 +15,10 @@ from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RecordingAccount, RunSnapshot, unused
 from phone_host.model import DepthAccount, Unwritten
 from phone_host.output.json_text import json_number, json_text
+from phone_host.report.json_result import result_values
 from phone_host.report.match_words import cut_sentence
-from phone_host.report.run_json import concern_values, problem_values, recording_values
+from phone_host.report.run_json import problem_values, recording_values
+from phone_host.report.stereo_trust import Doubt
 from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
 
 MOST_SAMPLES: Final = 120
@@ -210,7 +212,7 @@ def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:
     return {
         "level": said.grade.value,
         "headline": said.sentence,
-        "concerns": [concern_values(item) | {"problem": item.message} for item in concerns(run)],
+        "concerns": [result_values(Doubt, item) | {"problem": item.message} for item in concerns(run)],
     }
 
 

@@ -10,12 +10,15 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin
 from phone_host.bench.report import DelayBenchResult
 from phone_host.report.calibration_result import CalibrationResult, ImportResult
 from phone_host.report.json_result import Absent, types_of
+from phone_host.report.stereo_json import PairResult, SetResult
 
 SCHEMAS: Final = Path(__file__).parents[2] / "docs" / "schemas"
 RESULTS: Final[dict[str, type]] = {
     "calibrate": CalibrationResult,
     "calibrate-import": ImportResult,
     "delay-bench": DelayBenchResult,
+    "stereo": SetResult,
+    "stereo-pair": PairResult,
 }
 
 _PLAIN: Final = {str: "string", Path: "string", int: "integer", float: "number", bool: "boolean", NoneType: "null"}

@@ -13,7 +13,8 @@ from phone_host.diagnostics.codes import Code, diagnose
 from phone_host.diagnostics.drift import drift_concerns, drift_lines, stills_remedy, stills_words, told_as_a_turn
 from phone_host.model import AS_CALIBRATED, Change, ChangeKind, Departure, Drift, DriftState, Trend
 from phone_host.output.overlay_yaml import fingerprint, overlay_text, read_overlay
-from phone_host.report.drift_report import drift_table, drift_values, stills_drift_values
+from phone_host.report.drift_report import RunDrift, StillsDrift, drift_table
+from phone_host.report.json_result import result_values
 from tests.support.drift_sightings import two_webcams
 
 PITCHED = Departure(turn_rad=(math.radians(0.1), 0.0, 0.0))
@@ -125,9 +126,9 @@ def test_the_line_says_what_is_known() -> None:
 
 def test_report_and_page_hold_the_changes() -> None:
     """JSON has degrees and per cent, None where nothing is known; the page has a table only if something happened."""
-    assert drift_values(None) is None
+    assert result_values(RunDrift, None) is None
     back = Change(kind=ChangeKind.RETURNED, at_s=20.0, away_s=2.5)
-    values = drift_values(corrected(FAR, KNOCK, back))
+    values = result_values(RunDrift, corrected(FAR, KNOCK, back))
     assert values is not None
     assert values["departure"] == {"turn_deg": [0.3, 0.0, -0.1], "focal_percent": 0.0}
     changes = values["changes"]
@@ -135,7 +136,7 @@ def test_report_and_page_hold_the_changes() -> None:
     first, second = changes
     assert (first["what"], first["step"]["turn_deg"][0]) == ("knocked", 0.1)
     assert (second["what"], second["away_s"], "step" in second) == ("returned", 2.5, False)
-    empty = drift_values(Drift())
+    empty = result_values(RunDrift, Drift())
     assert empty is not None
     assert (empty["vertical_error_px"], empty["turn_sigma_deg"]) == (None, [None, None, None])
     [table] = drift_table(corrected(FAR, KNOCK, back))
@@ -215,11 +216,13 @@ def test_a_rig_of_stills_is_told_over_the_order_of_pairs(drift: Drift, words: st
 
 def test_the_report_of_stills_counts_pairs() -> None:
     """Rates are per pair, and a knock has the number of its pair; without a rig there is nothing."""
-    assert stills_drift_values(None) is None
-    values = stills_drift_values(replace(corrected(FAR, KNOCK), trend=Trend(turn_rad_s=(math.radians(0.02), 0.0, 0.0))))
+    assert result_values(StillsDrift, None) is None
+    values = result_values(
+        StillsDrift, replace(corrected(FAR, KNOCK), trend=Trend(turn_rad_s=(math.radians(0.02), 0.0, 0.0)))
+    )
     assert values is not None
     assert values["knocked_at_pair"] == [12]
-    assert values["trend"]["turn_deg_per_pair"] == [0.02, 0.0, 0.0]  # type: ignore[index]
+    assert values["trend"]["turn_deg_per_pair"] == [0.02, 0.0, 0.0]
 
 
 def test_a_knocked_rig_explains_what_single_pairs_look_like() -> None:

@@ -9,18 +9,23 @@ from typing import Any
 
 import pytest
 
+from common.diagnostic import Diagnostic
 from common.errors import DataError
 from phone_host.bench.report import as_json
 from phone_host.calibration.solve.verdict import Assessment
-from phone_host.model import Verdict
+from phone_host.model import Drift, MatchReport, Verdict
 from phone_host.output.rig_files.imported import Imported, RigKind
 from phone_host.report.calibration_report import ImportReport, Judged
 from phone_host.report.calibration_result import calibration_values, import_values
 from phone_host.report.json_result import ABSENT, D2, Absent, json_values
+from phone_host.report.stereo_json import pair_json, set_json
+from phone_host.report.stereo_report import FailedPair, SetReport
 from tests.docs.schemas import RESULTS, SCHEMAS, json_schema, text_of
 from tests.support.bench_results import UNDER, analysed, result, slower
 from tests.support.calibration_series import calibration, calibration_report
 from tests.support.rigs import unlike_rig
+from tests.unit.diagnostics.test_drift_words import KNOCK
+from tests.unit.report.test_stereo_report import BAD, PAIR
 
 KINDS: dict[str, Any] = {
     "string": str,
@@ -122,17 +127,23 @@ def test_the_documented_schema_is_the_classs(name: str) -> None:
 
 
 def test_reports_fit_their_schemas() -> None:
-    """Calibrations with and without a rig, an imported one, and benchmarks with and without pairs."""
+    """Calibrations with and without a rig, an imported one, benchmarks with and without pairs, pairs with all figures and with few."""
     judged = Judged(calibration(), Assessment(Verdict.USABLE, "take more"))
     imported = ImportReport(imported=Imported(rig=unlike_rig(), kind=RigKind.ROS, files=(), notes=()))
     runs = (result(), slower("serial", 2.0), slower("rfcomm", 1.5))
     nothing = replace(result(), ledgers=())
+    torn = FailedPair(name="p", left="l", right="r", failure=Diagnostic("bad", "mend"))
+    few = replace(PAIR, trust=BAD, match_report=MatchReport(), search=None, geometry=None, limits=None, cut=None)
     for name, values in (
         ("calibrate", calibration_values(calibration_report(judged))),
         ("calibrate", calibration_values(calibration_report(DataError("nothing is seen", "light it")))),
         ("calibrate-import", import_values(imported)),
         ("delay-bench", as_json(runs, UNDER, analysed(*runs))),
         ("delay-bench", as_json([nothing], UNDER, analysed(nothing))),
+        ("stereo-pair", pair_json(PAIR)),
+        ("stereo-pair", pair_json(few)),
+        ("stereo", set_json(SetReport(pairs=(PAIR, torn), by_number=True))),
+        ("stereo", set_json(SetReport(pairs=(few,), by_number=False, drift=Drift(changes=(KNOCK,))))),
     ):
         schema = json_schema(RESULTS[name])
         assert problems(values, schema, schema["$defs"]) == []
