@@ -30,18 +30,13 @@ class MeasuredPair:
 
     Attributes:
         name: for tables: the left image.
-        left: path of the left image.
-        right: path of the right image.
-        rectified_px: size of the rectified images.
-        geometry: of the rectified pair.
-        quality: the figures.
+        left: path of the left image; `right` likewise.
         calibration_error_m: bias that the calibration's own uncertainty leads one to expect, plus or minus, m; NaN: not known.
         board_misfit_px: RMS distance of a board's corners from its pose, px; NaN: no board.
         corners_bias_share: bias of the depths of a board's corners, from their own disparities, as a share: that of the rig
             alone, without matching; NaN: not known.
         picture: the distances from the plane, JPEG; empty without a plane.
         picture_range_px: distance of its strongest colours, px.
-        remarks: of this pair.
     """
 
     name: str
@@ -69,9 +64,7 @@ class QualityReport:
 
     Attributes:
         pairs: in order.
-        matcher: its name.
-        left_alone: left images without a partner.
-        right_alone: the same for right ones.
+        left_alone: left images without a partner; `right_alone` likewise.
         remarks: told once.
         interrupted_of: how many pairs were to be measured when the command was interrupted; 0: it was not.
     """

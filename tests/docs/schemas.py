@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin
 from phone_host.bench.report import DelayBenchResult
 from phone_host.report.calibration_result import CalibrationResult, ImportResult
 from phone_host.report.json_result import Absent, types_of
+from phone_host.report.quality_json import QualityResult
 from phone_host.report.stereo_json import PairResult, SetResult
 
 SCHEMAS: Final = Path(__file__).parents[2] / "docs" / "schemas"
@@ -17,6 +18,7 @@ RESULTS: Final[dict[str, type]] = {
     "calibrate": CalibrationResult,
     "calibrate-import": ImportResult,
     "delay-bench": DelayBenchResult,
+    "quality": QualityResult,
     "stereo": SetResult,
     "stereo-pair": PairResult,
 }

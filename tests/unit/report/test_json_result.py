@@ -14,13 +14,16 @@ from common.errors import DataError
 from phone_host.bench.report import as_json
 from phone_host.calibration.solve.verdict import Assessment
 from phone_host.model import Drift, MatchReport, Verdict
+from phone_host.output.json_text import json_text, json_value
 from phone_host.output.rig_files.imported import Imported, RigKind
 from phone_host.report.calibration_report import ImportReport, Judged
 from phone_host.report.calibration_result import calibration_values, import_values
 from phone_host.report.json_result import ABSENT, D2, Absent, json_values
+from phone_host.report.quality_json import quality_json
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import FailedPair, SetReport
 from tests.docs.schemas import RESULTS, SCHEMAS, json_schema, text_of
+from tests.support import quality_pages
 from tests.support.bench_results import UNDER, analysed, result, slower
 from tests.support.calibration_series import calibration, calibration_report
 from tests.support.rigs import unlike_rig
@@ -140,10 +143,11 @@ def test_reports_fit_their_schemas() -> None:
         ("calibrate-import", import_values(imported)),
         ("delay-bench", as_json(runs, UNDER, analysed(*runs))),
         ("delay-bench", as_json([nothing], UNDER, analysed(nothing))),
+        ("quality", quality_json(quality_pages.report(failed=True))),
         ("stereo-pair", pair_json(PAIR)),
         ("stereo-pair", pair_json(few)),
         ("stereo", set_json(SetReport(pairs=(PAIR, torn), by_number=True))),
         ("stereo", set_json(SetReport(pairs=(few,), by_number=False, drift=Drift(changes=(KNOCK,))))),
     ):
         schema = json_schema(RESULTS[name])
-        assert problems(values, schema, schema["$defs"]) == []
+        assert problems(json_value(json_text(values)), schema, schema["$defs"]) == []
