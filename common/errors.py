@@ -16,9 +16,13 @@ class TandemError(Exception):
     Args:
         problem: what is wrong, naming the culprit.
         remedy: what to do about it.
+
+    Attributes:
+        program: of a command line that is not taken, the command or verb that refuses it; empty: it is about something else.
     """
 
     exit_code: ClassVar[int] = 1
+    program = ""
 
     def __init__(self, problem: str, remedy: str) -> None:
         super().__init__(problem, remedy)

@@ -14,8 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NoReturn
 
-from common.errors import TandemError
-from common.plain_text import printable
+from common.errors import SettingsError, TandemError
 from common.program import interrupts
 from common.program.interrupts import forget_terminal
 from common.program.invocation import as_found
@@ -168,24 +167,18 @@ class ExamplesFirstParser(argparse.ArgumentParser):
         return word[:2] not in known and not any(option.startswith(name) for option in known)
 
     def error(self, message: str) -> NoReturn:
-        """Print the problem as one line on stderr, without the usage, and exit with code 2."""
-        line = f"{self.prog}: error: {self.problem(message)}: see {self.prog} --help"
-        self.exit(2, f"{fitted(line, sys.stderr)}\n")
-
-    def problem(self, message: str) -> str:
         """Say in one line of plain words what argparse found wrong.
 
         An unknown option goes before what is missing: the one may be the other, misspelt.
+
+        Raises:
+            SettingsError: always.
         """
         if message.startswith(_MISSING) and (unknown := [word for word in self._words if self._is_unknown(word)]):
             message = self._unknown(unknown)
-        return printable(_plain(" ".join(message.split())))
-
-    @property
-    def declared(self) -> dict[str, argparse.Action]:
-        """The options, by their long name without dashes."""
-        found = self._option_string_actions.items()
-        return {name.removeprefix("--"): action for name, action in found if name.startswith("--")}
+        refusal = SettingsError(f"{_plain(' '.join(message.split()))}", f"see {self.prog} --help")
+        refusal.program = self.prog
+        raise refusal
 
 
 def _guess(word: str, known: Iterable[str]) -> str:
@@ -338,12 +331,12 @@ def _ran(
 ) -> int:
     try:
         return command(parser.parse_args(arguments, options))
-    except SystemExit as leaving:  # argparse, after --help or an error
+    except SystemExit as leaving:  # argparse, after --help
         return leaving.code if isinstance(leaving.code, int) else 0
     except TandemError as error:
-        if options.debug:
+        if options.debug and not error.program:
             raise
-        _say(f"{parser.prog}: error: {error}")
+        _say(f"{error.program or parser.prog}: error: {error}")
         return error.exit_code
     except ImportError as error:
         missing = package_error(error)

@@ -10,22 +10,10 @@ same function, whether it comes from a command line, a page or a settings file.
 
 import argparse
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any, Final, TypeVar
 
 from common.program.quantities import reading
-
-
-def setting(default: Any, doc: str, read: Callable[[str, str], float] | None = None) -> Any:  # noqa: ANN401 - stands in a dataclass field of any type, as dataclasses.field does
-    """Declare one setting of a settings dataclass.
-
-    Args:
-        default: its value if nothing else is given.
-        doc: one sentence for people.
-        read: reads a number that may have a unit, from a text and the name of what holds it; None: the setting is no such number.
-    """
-    return field(default=default, metadata={"doc": doc, "read": read})
-
 
 T = TypeVar("T")
 
@@ -34,7 +22,7 @@ _PART: Final = "part"
 
 
 @dataclass(frozen=True, slots=True)
-class _Option:
+class Option:
     """See `option`."""
 
     flags: tuple[str, ...]
@@ -43,14 +31,20 @@ class _Option:
     alone: bool
     often: bool
     group: str
+    page: bool
     declared: dict[str, Any]
+
+    @property
+    def is_switch(self) -> bool:
+        """Whether it is given without a value."""
+        return self.declared.get("action") == "store_true"
 
     @property
     def usual(self) -> Any:  # noqa: ANN401 - of any field
         """What counts as given where nothing is."""
-        if self.declared.get("action") == "store_true":
-            return False
-        return self.declared.get("default", [] if self.declared.get("nargs") == "*" else None)
+        return self.declared.get(
+            "default", False if self.is_switch else [] if self.declared.get("nargs") == "*" else None
+        )
 
     def called(self, name: str) -> str:
         """Return what a user calls it: the flag, or what stands for a positional argument."""
@@ -74,6 +68,7 @@ def option(
     alone: bool = False,
     often: bool = False,
     group: str = "",
+    page: bool = True,
     **declared: Any,  # noqa: ANN401 - argparse's own
 ) -> Any:  # noqa: ANN401 - stands in a dataclass field of any type, as dataclasses.field does
     """Declare a field of a request, and the option that gives it.
@@ -85,12 +80,45 @@ def option(
         alone: this option and the others that say so exclude each other.
         often: many need it, so help shows it first, outside of its group.
         group: title of the group in which help shows it; empty: that of its part.
+        page: whether the page may set it. Options of the program itself, and what only a terminal can do, are not the page's.
         declared: what `ArgumentParser.add_argument` takes; the default is as a user writes it.
     """
-    made = _Option(flags, read, number, alone, often, group, declared)
+    made = Option(flags, read, number, alone, often, group, page, declared)
     is_required = declared.get("required", not flags and declared.get("nargs") not in {"?", "*"})
     usual = MISSING if is_required else made.value(made.usual, "")
     return field(default=usual, metadata={_OPTION: made})
+
+
+def setting(
+    default: Any,  # noqa: ANN401 - as above
+    doc: str,
+    number: Callable[[str, str], float] | None = None,
+    flag: str = "",
+    **declared: Any,  # noqa: ANN401 - as above
+) -> Any:  # noqa: ANN401 - as above
+    """Declare one setting of a settings dataclass, and the option that gives it.
+
+    Args:
+        default: its value if nothing else is given.
+        doc: one sentence for people: the option's help.
+        number: reads a number that may have a unit, from a text and the name of what holds it; None: the setting is no such number.
+        flag: name of the option; empty: it has none here.
+        declared: what `option` takes.
+    """
+    made = option(flag, number=number, help=doc, default=None, **declared).metadata if flag else {}
+    return field(default=default, metadata={"read": number, **made})
+
+
+def option_of(settings: type, name: str, **changes: Any) -> Any:  # noqa: ANN401 - as above
+    """Declare a field of a request that is given by the option of a setting; None: the setting stays as it is.
+
+    Args:
+        settings: the settings dataclass.
+        name: of the setting.
+        changes: what of `option` is different here.
+    """
+    made = next(item.metadata[_OPTION] for item in fields(settings) if item.name == name)
+    return field(default=None, metadata={_OPTION: replace(made, **changes)})
 
 
 def part(kind: type[T], when: str = "", group: str = "") -> T:
@@ -132,7 +160,7 @@ def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "", gro
             add_options(parser, *item.metadata[_PART])
         if _OPTION not in item.metadata:
             continue
-        made: _Option = item.metadata[_OPTION]
+        made: Option = item.metadata[_OPTION]
         declared = {**made.declared, "help": when + made.declared["help"]}
         if made.number is not None:
             declared["type"] = reading(made.number, made.called(item.name))
@@ -147,11 +175,15 @@ def add_options(parser: argparse.ArgumentParser, kind: type, when: str = "", gro
         place.add_argument(*made.flags or (item.name,), **declared)
 
 
-def usual_values(kind: type) -> dict[str, object]:
-    """Return what counts as given where nothing is, by the option's name."""
-    parser = argparse.ArgumentParser(add_help=False)
-    add_options(parser, kind)
-    return vars(parser.parse_args([]))
+def options_of(kind: type) -> dict[str, Option]:
+    """Return the options of a request, or of a group of options, with those of its parts, each by the name of its value."""
+    found: dict[str, Option] = {}
+    for item in fields(kind):
+        if _PART in item.metadata:
+            found |= options_of(item.metadata[_PART][0])
+        elif _OPTION in item.metadata:
+            found[item.metadata[_OPTION].key(item.name)] = item.metadata[_OPTION]
+    return found
 
 
 def read_request(kind: type[T], given: Mapping[str, object]) -> T:
@@ -183,19 +215,15 @@ def given_words(kind: type, given: Mapping[str, object]) -> dict[str, list[str]]
         given: values by the option's name, as they were written.
     """
     found: dict[str, list[str]] = {}
-    for item in fields(kind):
-        if _PART in item.metadata:
-            found |= given_words(item.metadata[_PART][0], given)
-        elif _OPTION in item.metadata and item.metadata[_OPTION].flags:
-            made: _Option = item.metadata[_OPTION]
-            key = made.key(item.name)
-            flag, value = made.flags[0], given.get(key, made.usual)
-            if value == made.usual:
-                continue
-            if isinstance(value, bool):
-                found[key] = [flag if value else f"--no-{flag.removeprefix('--')}"]
-            elif made.declared.get("action") == "append" and isinstance(value, list):
-                found[key] = [word for each in value for word in (flag, str(each))]
-            else:
-                found[key] = [flag, *map(str, value if isinstance(value, list) else [value])]
+    for key, made in options_of(kind).items():
+        value = given.get(key, made.usual)
+        if not made.flags or value == made.usual:
+            continue
+        flag = made.flags[0]
+        if isinstance(value, bool):
+            found[key] = [flag if value else f"--no-{flag.removeprefix('--')}"]
+        elif made.declared.get("action") == "append" and isinstance(value, list):
+            found[key] = [word for each in value for word in (flag, str(each))]
+        else:
+            found[key] = [flag, *map(str, value if isinstance(value, list) else [value])]
     return found

@@ -8,13 +8,13 @@ from typing import Final
 from common.errors import SettingsError
 from common.imagesize.head import MOST_SIDE_PX
 from common.program.quantities import decimal_number
-from common.program.request import option
-from phone_host.declared_settings import NEAR_M
+from common.program.request import option, option_of
+from phone_host.declared_settings import NEAR_M, PhoneHostSettings
 from phone_host.jobs.units import baseline_mm, limit_mm
 from phone_host.model import Crop
 from phone_host.output.axes import Axes
 from phone_host.stereo.depth_limits import DepthWanted
-from phone_host.stereo.matcher_names import MatcherName, default_words
+from phone_host.stereo.matcher_names import default_words
 
 DEFAULT_NEAR_MM: Final = NEAR_M * 1000
 """Default nearest depth, mm: the near limit of hand-held scanners (Structure Sensor 350 mm, RealSense D435 280 mm).
@@ -111,12 +111,7 @@ class DepthOptions:
         axes: of the points in files.
     """
 
-    calibration: str | None = option(
-        "--calibration",
-        often=True,
-        metavar="FILE",
-        help="rig.yaml of the two cameras, made by phone-host calibrate; or, for rectified images, the calib.txt of Middlebury, ETH3D or KITTI",
-    )
+    calibration: str | None = option_of(PhoneHostSettings, "calibration", often=True)
     use_rejected_rig: bool = option(
         "--use-rejected-rig",
         group="calibration",
@@ -169,11 +164,7 @@ class DepthOptions:
         metavar="CX,CY",
         help="principal point of the left rectified image",
     )
-    matcher: str | None = option(
-        "--matcher",
-        metavar="NAME",
-        help=f"stereo matcher: {' or '.join(name.value for name in MatcherName)}, onnx:PATH for a network, or one from an installed package ({default_words()})",
-    )
+    matcher: str | None = option_of(PhoneHostSettings, "matcher")
     overlay: Path | None = option(
         "--overlay",
         group="calibration",

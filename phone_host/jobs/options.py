@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 from typing import Final
 
-from common.camera.options import TURNED
 from common.orientation import Flip, Orientation
-from common.program.quantities import milliseconds, seconds
-from common.program.request import option
-from phone_host.camera.uris import EXAMPLE
-from phone_host.declared_settings import MAX_MEGAPIXELS_HELP
+from common.program.quantities import seconds
+from common.program.request import option, option_of
+from phone_host.declared_settings import LINK_HELP, PhoneHostSettings
 
 PAIRED: Final = (
     "two files, two folders or two globs; images of folders and globs are paired by the number in the name, else by equal names,"
@@ -17,7 +15,6 @@ PAIRED: Final = (
 """How LEFT and RIGHT are given, for the verbs that take pairs of images."""
 
 LAN_HELP: Final = "serve the page to other machines: by https with a certificate authority of this machine's own, and only with the token of the first address"
-_FORMS: Final = "address of the board: tcp://HOST:PORT, ipc://PATH[?owner=USER], serial:DEVICE or rfcomm://DEVICE (default: look for a board)"
 _WAIT_HELP: Final = "seconds to wait for a board, then exit with code 3 (default: wait for ever{})"
 
 
@@ -25,37 +22,24 @@ _WAIT_HELP: Final = "seconds to wait for a board, then exit with code 3 (default
 class CameraOptions:
     """Which board and which camera pairs come from."""
 
-    link: tuple[str, ...] | None = option(
-        "--link",
-        often=True,
-        action="append",
-        metavar="URI",
-        help=f"{_FORMS}; repeat the option: the frames come over the best link that is up",
-    )
-    camera: str | None = option(
-        "--camera", often=True, metavar="URI", help=f"camera of this machine: {EXAMPLE}; {TURNED}"
-    )
-    wait_s: float | None = option("--wait", number=seconds, metavar="S", help=_WAIT_HELP.format(""))
-    keys: str | None = option("--keys", metavar="DIR", help="folder of keys (default ~/.config/tandemscan)")
+    link: tuple[str, ...] | None = option_of(PhoneHostSettings, "link", often=True)
+    camera: str | None = option_of(PhoneHostSettings, "camera", often=True)
+    wait_s: float | None = option("--wait", page=False, number=seconds, metavar="S", help=_WAIT_HELP.format(""))
+    keys: str | None = option_of(PhoneHostSettings, "keys")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OneLinkOptions(CameraOptions):
     """The same, with one link."""
 
-    link: str | None = option("--link", often=True, metavar="URI", help=_FORMS)  # type: ignore[assignment]  # one in place of several
+    link: str | None = option("--link", often=True, metavar="URI", help=LINK_HELP)  # type: ignore[assignment]  # one in place of several
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairOptions(CameraOptions):
     """The same, and when two frames are a pair."""
 
-    tolerance_ms: float | None = option(
-        "--tolerance",
-        number=milliseconds,
-        metavar="MS",
-        help="greatest difference of the two exposure times in a pair (default: half of the longer frame period)",
-    )
+    tolerance_ms: float | None = option_of(PhoneHostSettings, "tolerance")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +47,7 @@ class RunCameraOptions(PairOptions):
     """The same, for `run`, which may have a time limit."""
 
     wait_s: float | None = option(
-        "--wait", number=seconds, metavar="S", help=_WAIT_HELP.format("; with --seconds S, S + 10 seconds")
+        "--wait", page=False, number=seconds, metavar="S", help=_WAIT_HELP.format("; with --seconds S, S + 10 seconds")
     )
 
 
@@ -71,6 +55,7 @@ def _flip(side: str) -> Flip:
     mirror = f"mirror the {side} images, after turning them: h exchanges left and right, v top and bottom"
     return option(  # type: ignore[no-any-return]
         f"--flip-{side}",
+        page=False,
         read=lambda text, _: Flip(text),
         choices=(Flip.H.value, Flip.V.value),
         default=Flip.NONE.value,
@@ -80,7 +65,7 @@ def _flip(side: str) -> Flip:
 
 def _rotate(side: str) -> int:
     turn = f"turn the {side} images clockwise by so many degrees: their camera is mounted turned"
-    return option(f"--rotate-{side}", type=int, choices=(90, 180, 270), default=0, help=turn)  # type: ignore[no-any-return]
+    return option(f"--rotate-{side}", page=False, type=int, choices=(90, 180, 270), default=0, help=turn)  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +76,7 @@ class ImageOptions:
     rotate_right: int = _rotate("right")
     flip_left: Flip = _flip("left")
     flip_right: Flip = _flip("right")
-    max_megapixels: int | None = option("--max-megapixels", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP)
+    max_megapixels: int | None = option_of(PhoneHostSettings, "max_megapixels")
 
     @property
     def mounted(self) -> tuple[Orientation, Orientation]:

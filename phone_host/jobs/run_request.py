@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import DataError, SettingsError
-from common.program.quantities import milliseconds, seconds
-from common.program.request import Request, option, part
+from common.program.quantities import seconds
+from common.program.request import Request, option, option_of, part
 from common.program.settings import Resolved
-from phone_host.declared_settings import MAX_MEGAPIXELS_HELP, PhoneHostSettings
+from phone_host.declared_settings import PhoneHostSettings
 from phone_host.jobs.depth import LimitedDepthOptions, depth_wanted
 from phone_host.jobs.options import LAN_HELP, RunCameraOptions
 from phone_host.model import Rig, Side
@@ -54,34 +54,10 @@ class RunRequest(Request):
         choices=("left", "right"),
         help="which view the board's camera gives (default: as in the calibration, else left)",
     )
-    fifo: str | None = option(
-        "--fifo",
-        group="depth",
-        metavar="DEPTH:POLICY",
-        help="length of the queue before the matcher, and what happens when it is full: drop-oldest, drop-newest or block (default 1:drop-oldest)",
-    )
-    budget_ms: float | None = option(
-        "--budget",
-        group="depth",
-        number=milliseconds,
-        metavar="MS",
-        help="time for each pair: choose working size, search range and matcher to hold it, and follow when the machine slows down; --scale, --matcher, --disparities and --near stay as given (default: no budget)",
-    )
-    align_phase: str | None = option(
-        "--align-phase",
-        group="cameras and links",
-        nargs="?",
-        const="either",
-        choices=("either", "board", "host"),
-        help="shift the exposure of one camera until both expose together; say which one may be shifted (default either)",
-    )
-    interpolate: bool | None = option(
-        "--interpolate",
-        group="depth",
-        action="store_true",
-        default=None,
-        help="move the board's image along the optical flow to the moment of the other camera's exposure",
-    )
+    fifo: str | None = option_of(PhoneHostSettings, "fifo", group="depth")
+    budget_ms: float | None = option_of(PhoneHostSettings, "budget", group="depth")
+    align_phase: str | None = option_of(PhoneHostSettings, "align_phase", group="cameras and links")
+    interpolate: bool | None = option_of(PhoneHostSettings, "interpolate", group="depth")
     pairs: int | None = option(
         "--pairs",
         group="output",
@@ -127,22 +103,18 @@ class RunRequest(Request):
     )
     serve: str | bool | None = option(
         "--serve",
+        page=False,
         nargs="?",
         const=True,
         metavar="HOST:PORT",
         help="show the run on a page of this machine (default 127.0.0.1:8765, with --lan 0.0.0.0:8765); phone-host serve does more",
     )
-    lan: bool = option("--lan", group="output", action="store_true", help=f"with --serve: {LAN_HELP}")
-    max_megapixels: int | None = option(
-        "--max-megapixels", group="cameras and links", type=int, metavar="N", help=MAX_MEGAPIXELS_HELP
+    lan: bool = option("--lan", page=False, group="output", action="store_true", help=f"with --serve: {LAN_HELP}")
+    max_megapixels: int | None = option_of(PhoneHostSettings, "max_megapixels", group="cameras and links")
+    config: Path | None = option(
+        "--config", page=False, group="settings", type=Path, metavar="FILE", help="settings file (TOML)"
     )
-    config: Path | None = option("--config", group="settings", type=Path, metavar="FILE", help="settings file (TOML)")
-    log_level: str | None = option(
-        "--log-level",
-        group="settings",
-        choices=("debug", "info", "warning", "error"),
-        help="least important messages that are logged to stderr",
-    )
+    log_level: str | None = option_of(PhoneHostSettings, "log_level", group="settings")
 
 
 def checked(request: RunRequest, found: Resolved[PhoneHostSettings] | None = None) -> Resolved[PhoneHostSettings]:

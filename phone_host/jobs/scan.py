@@ -8,7 +8,7 @@ from pathlib import Path
 from common.errors import SettingsError
 from common.orientation import UPRIGHT
 from common.program import logs
-from common.program.request import read_request, usual_values
+from common.program.request import options_of, read_request
 from common.program.settings import Resolved, log_level
 from common.program.signals import StopSignals
 from common.protocol.message import Pacing
@@ -121,7 +121,7 @@ def open_scan(
     """
     wanted = model_wanted(request.model, request.out)
     # the run beneath writes nothing itself
-    own = {name: request.given.get(name, usual) for name, usual in usual_values(RunRequest).items()}
+    own = {name: request.given.get(name, made.usual) for name, made in options_of(RunRequest).items()}
     told = {name: request.given.get(name, False) for name in ("json", "debug")}
     run = read_request(RunRequest, {**own, **told, "out": None})
     axes = axes_beside(request.depth.axes, wanted)

@@ -129,6 +129,7 @@ class ModelOptions:
     )
     most_bytes: float = option(
         "--memory",
+        page=False,
         number=file_size,
         default=300e6,
         metavar="SIZE",
@@ -143,6 +144,7 @@ class ModelOptions:
     )
     onto: Path | None = option(
         "--onto",
+        page=False,
         type=Path,
         metavar="DIR",
         help="with --turntable: a second pass, the object turned over, is added to the one whose results are in DIR; how it lies is found by its shape",

@@ -1,16 +1,16 @@
 """The page's choices are options of `phone-host run` by name. They become requests, and are read by what reads command lines."""
 
-import argparse
 import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Final, NoReturn, TypeVar
+from typing import Final, TypeVar
 
 from common.errors import SettingsError
 from common.program.commandline import ExamplesFirstParser
-from common.program.request import add_options, read_request
+from common.program.request import Option, add_options, options_of, read_request
 from phone_host.camera.uris import is_browser
+from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.run_request import RunRequest
 from phone_host.jobs.scan_request import ModelOptions, model_wanted
 from phone_host.scan.scan_wanted import ScanWanted
@@ -23,46 +23,37 @@ T = TypeVar("T")
 _YES: Final = frozenset({"yes", "true", "on", "1"})
 _NO: Final = frozenset({"", "no", "false", "off", "0"})
 
-_NOT_CHOSEN: Final = frozenset(
-    {"help", "version", "config", "json", "debug", "serve", "lan", "open", "keys", "log-level", "wait"}
-)
-"""Options of `run` that are not the page's: what concerns this program as a whole, and what a page cannot be asked."""
-
 _PLACES: Final = frozenset({"calibration", "out"})
 """Options that name a file or folder."""
 
 _SHORT: Final = frozenset({"link", "camera", "board-side", "tolerance", "fifo", "max-megapixels"})
 """What a run without depth needs."""
 
-_OF_SCAN: Final = ("voxel", "box", "mat", "turntable", "object", "unseen")
-"""Options of `scan` that the page may give."""
-
-
-class _StrictParser(ExamplesFirstParser):
-    """A parser that raises what it would print."""
-
-    def __init__(self) -> None:
-        super().__init__("phone-host", add_help=False)
-        self.add_argument("--json", action="store_true")
-        self.add_argument("--debug", action="store_true")
-
-    def error(self, message: str) -> NoReturn:
-        """See ExamplesFirstParser."""
-        raise SettingsError(
-            f"not valid: {self.problem(message)}", "give it as on the command line: phone-host run --help"
-        )
-
-
-def _parser(kind: type) -> _StrictParser:
-    made = _StrictParser()
-    add_options(made, kind)
-    return made
-
 
 @cache
-def _declared(kind: type) -> dict[str, argparse.Action]:
+def options_by_flag(kind: type) -> dict[str, Option]:
     """Return the options of a request: the page's state asks for them several times a second."""
-    return _parser(kind).declared
+    return {made.flags[0].removeprefix("--"): made for made in options_of(kind).values() if made.flags}
+
+
+def page_options(kind: type) -> dict[str, Option]:
+    """Return those that the page may set."""
+    return {name: made for name, made in options_by_flag(kind).items() if made.page}
+
+
+def value_schemas() -> dict[str, object]:
+    """Return JSON schemas of the values that the page's commands of the same names take."""
+    kinds = {"set": RunRequest, "calibrate": CalibrateRequest, "scan": ModelOptions}
+    return {
+        f"{do}_values": {
+            "type": "object",
+            "properties": {
+                name: {"type": "string", "description": made.declared["help"].replace("%%", "%")}
+                for name, made in page_options(kind).items()
+            },
+        }
+        for do, kind in kinds.items()
+    }
 
 
 def with_changes(choices: Choices, changes: Choices) -> dict[str, str]:
@@ -71,14 +62,14 @@ def with_changes(choices: Choices, changes: Choices) -> dict[str, str]:
     Raises:
         SettingsError: there is no such option, or it is a switch and the value neither yes nor no.
     """
-    declared = _declared(RunRequest)
+    settable = page_options(RunRequest)
     made = dict(choices)
     for name, value in changes.items():
-        if name not in declared or name in _NOT_CHOSEN:
+        if name not in settable:
             raise SettingsError(f"{name!r} is no option of a run that the page can set", "see phone-host run --help")
         made.pop(name, None)
         kept = placed(value) if name in _PLACES else value.strip()
-        if _is_switch(declared[name]):
+        if settable[name].is_switch:
             if kept.lower() not in _YES | _NO:
                 raise SettingsError(f"{name} is {value!r}", "give yes or no")
             kept = "yes" if kept.lower() in _YES else ""
@@ -99,11 +90,11 @@ def placed(path: str) -> str:
 
 def words_of(choices: Choices, kind: type = RunRequest) -> list[str]:
     """Return those choices that a request takes as the words of its command line, after the verb."""
-    declared, words = _declared(kind), list[str]()
+    declared, words = options_by_flag(kind), list[str]()
     for name, value in choices.items():
         if name not in declared:
             continue
-        if _is_switch(declared[name]):
+        if declared[name].is_switch:
             words.append(f"--{name}")
         else:
             for each in value.split() if name == "link" else [value]:
@@ -123,29 +114,31 @@ def choices_of(given: Mapping[str, object]) -> dict[str, str]:
         given: of `run`, by name.
     """
     found = {}
-    for name, action in _declared(RunRequest).items():
-        value = given.get(action.dest)
-        if name not in _NOT_CHOSEN and value != action.default and value is not None:
-            found[name] = "yes" if _is_switch(action) else " ".join(value) if isinstance(value, list) else str(value)
+    for name, made in page_options(RunRequest).items():
+        value = given.get(made.key(name))
+        if value != made.usual and value is not None:
+            found[name] = "yes" if made.is_switch else " ".join(value) if isinstance(value, list) else str(value)
     return found
 
 
-def given_by(choices: Choices, kind: type = RunRequest) -> dict[str, object]:
-    """Return the options of a request by name, as a command line gives them; what they say is not checked.
+def given_by(choices: Choices, kind: type = RunRequest, verb: str = "run") -> dict[str, object]:
+    """Return the options of a request by name, as the command line of its verb gives them; what they say is not checked.
 
     Raises:
         SettingsError: one lacks its value, or has one of another kind.
     """
-    return vars(_parser(kind).parse_args(words_of(choices, kind)))
+    parser = ExamplesFirstParser(f"phone-host {verb}", add_help=False)
+    add_options(parser, kind)
+    return {"json": False, "debug": False, **vars(parser.parse_args(words_of(choices, kind)))}
 
 
-def request_of(choices: Choices, kind: type[T]) -> T:
+def request_of(choices: Choices, kind: type[T], verb: str = "run") -> T:
     """Make a request, or a group of options, of choices.
 
     Raises:
         SettingsError: they are not valid.
     """
-    return read_request(kind, given_by(choices, kind))
+    return read_request(kind, given_by(choices, kind, verb))
 
 
 def asked_scan(values: Choices) -> ScanWanted:
@@ -157,18 +150,15 @@ def asked_scan(values: Choices) -> ScanWanted:
     Raises:
         SettingsError: the page may not give one of them, or it is invalid, or contradicts another.
     """
-    if unknown := set(values) - set(_OF_SCAN):
+    settable = page_options(ModelOptions)
+    if unknown := values.keys() - settable:
         raise SettingsError(
-            f"{min(unknown)!r} is no option of a scan that the page can set", f"give some of {', '.join(_OF_SCAN)}"
+            f"{min(unknown)!r} is no option of a scan that the page can set", f"give some of {', '.join(settable)}"
         )
     chosen = {name: text for name, value in values.items() if (text := value.strip())}
-    return model_wanted(request_of(chosen, ModelOptions), None)
+    return model_wanted(request_of(chosen, ModelOptions, "scan"), None)
 
 
 def without_depth(choices: Choices) -> dict[str, str]:
     """Return what of the choices a run without depth needs."""
     return {name: value for name, value in choices.items() if name in _SHORT}
-
-
-def _is_switch(action: argparse.Action) -> bool:
-    return action.nargs == 0

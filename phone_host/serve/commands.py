@@ -1,7 +1,7 @@
 """What is chosen on the page, and the jobs that it begins: choices go through the same code as a command line."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -38,6 +38,7 @@ from phone_host.run.sinks import Sink
 from phone_host.serve.choices import (
     Choices,
     asked_scan,
+    page_options,
     placed,
     request_of,
     shown_words,
@@ -63,7 +64,6 @@ _CAPTURE_S: Final = 60.0
 
 _RIG: Final = Path("rig") / "rig.yaml"
 _OF_DEPTH: Final = ("near", "far", "crop", "scale")
-_OF_CALIBRATION: Final = ("board", "square", "baseline", "views")
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,10 +253,10 @@ class Commands:
             sinks: take its pairs.
         """
         given = {name: value for name, value in without_depth(choices).items() if name != "fifo"}
-        given |= {name: values[name] for name in _OF_CALIBRATION if values.get(name)}
+        given |= {name: values[name] for name in page_options(CalibrateRequest) if values.get(name)}
         given |= {name: value for name, value in self._fixed.items() if name == "keys"}
-        given |= {"live": "yes", "no-sound": "yes", "out": placed(values.get("out", "")) or str(data_folder() / _RIG)}
-        request = request_of(given, CalibrateRequest)
+        given |= {"live": "yes", "out": placed(values.get("out", "")) or str(data_folder() / _RIG)}
+        request = replace(request_of(given, CalibrateRequest, "calibrate"), sound=False)
         asked = asked_of(request)
         require_rig_place(request.out)
         return Calibration(request, asked, prepare_views(request, asked, self.feed, sinks))

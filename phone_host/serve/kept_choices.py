@@ -2,7 +2,6 @@
 
 import fcntl
 from contextlib import suppress
-from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,11 +10,11 @@ from common.files import opened_folder, replacing_in
 from common.program.settings import read_file
 from common.program.settings_file import Value, changed
 from phone_host.declared_settings import PhoneHostSettings
-from phone_host.serve.choices import Choices, given_by, with_changes
+from phone_host.serve.choices import Choices, given_by, options_by_flag, page_options, with_changes
 from phone_host.settings import PAGE_TABLE
 
-_NAMES: Final = {item.name.replace("_", "-"): item.name for item in fields(PhoneHostSettings)}
-_OF_PROGRAM: Final = ("keys", "log-level")
+_SETTINGS: Final = options_by_flag(PhoneHostSettings)
+_OF_PROGRAM: Final = _SETTINGS.keys() - page_options(PhoneHostSettings)
 """Settings that concern the program and not the page's choices. They stay as they are."""
 
 
@@ -46,7 +45,7 @@ def load_choices(file: Path) -> tuple[dict[str, str], dict[str, str]]:
     if not is_there(file):
         return {}, {}
     content = read_file(file)
-    found = {name: _as_words(content[key]) for name, key in _NAMES.items() if key in content}
+    found = {name: _as_words(content[key]) for name, made in _SETTINGS.items() if (key := made.key(name)) in content}
     table = content.get(PAGE_TABLE, {})
     if isinstance(table, dict):
         chosen = {name: value for name, value in table.items() if isinstance(value, str)}
@@ -103,11 +102,11 @@ def _with_choices(text: str, choices: Choices) -> str:
     """Return the text of a settings file with these choices in place of its own."""
     options = given_by(choices)
     keys: dict[str, Value | None] = {}
-    for name, key in _NAMES.items():
-        if name not in _OF_PROGRAM:
-            value: Any = options[key] if name in choices else None
-            keys[key] = tuple(value) if isinstance(value, list) else value
-    others = {name: value for name, value in choices.items() if name not in _NAMES}
+    for name, made in page_options(PhoneHostSettings).items():
+        key = made.key(name)
+        value: Any = options[key] if name in choices else None
+        keys[key] = tuple(value) if isinstance(value, list) else value
+    others = {name: value for name, value in choices.items() if name not in _SETTINGS}
     return changed(text, keys, PAGE_TABLE, others)
 
 

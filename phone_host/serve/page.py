@@ -20,7 +20,7 @@ from phone_host.declared_settings import PhoneHostSettings
 from phone_host.jobs.run_request import RunRequest
 from phone_host.output.axes import Axes
 from phone_host.serve.beside import BesideRun
-from phone_host.serve.choices import choices_of, shown_words
+from phone_host.serve.choices import choices_of, shown_words, value_schemas
 from phone_host.serve.saved import page_folder
 from phone_host.settings import key_folder
 from phone_host.web.invitation import by_cable, invitation, own_names
@@ -66,7 +66,7 @@ def page_settings(text: str | None, keys: Path, *, lan: bool = False) -> PageSet
     """
     host, port = address_of(text, _EVERYWHERE if lan else DEFAULT_HOST)
     credentials = kept_credentials(keys, own_names(), datetime.now().astimezone()) if lan else None
-    settings = PageSettings(host=host, port=port, credentials=credentials)
+    settings = PageSettings(host=host, port=port, credentials=credentials, values=value_schemas())
     return replace(settings, token=kept_token(keys))
 
 

@@ -1,8 +1,7 @@
 """phone-host settings: print each setting with its origin."""
 
-from dataclasses import Field, dataclass, fields, make_dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from common.program.request import Request, option, part
 from common.program.settings import listing
@@ -15,29 +14,12 @@ EXAMPLES = """  phone-host settings
 """
 
 
-def _given(item: Field[Any]) -> object:
-    """Declare the option of a setting; None: it is not given."""
-    several, flag = isinstance(item.default, tuple), f"--{item.name.replace('_', '-')}"
-    if isinstance(item.default, bool):
-        return option(flag, action="store_true", default=None, help=item.metadata["doc"])
-    return option(
-        flag,
-        number=item.metadata["read"],
-        type=str if several else type(item.default),
-        action="append" if several else "store",
-        metavar=item.name.rpartition("_")[2].upper(),
-        help=item.metadata["doc"].replace("%", "%%"),
-    )
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SettingsRequest(Request):
-    """What settings can be told: each setting."""
+    """What settings can be told: each setting, by the option that it has for `run`."""
 
     config: Path | None = option("--config", type=Path, metavar="FILE", help="settings file (TOML)")
-    settings: object = part(
-        make_dataclass("Settings", [(item.name, object, _given(item)) for item in fields(PhoneHostSettings)])
-    )
+    settings: PhoneHostSettings = part(PhoneHostSettings)
 
 
 def run(request: SettingsRequest) -> int:

@@ -69,6 +69,7 @@ class Answers:
         files: the page's files.
         limits: how much at once.
         authority: certificate of the page's own authority, PEM; empty without https.
+        values: schemas of what commands take.
     """
 
     def __init__(
@@ -81,9 +82,10 @@ class Answers:
         files: dict[str, StaticFile],
         limits: Limits,
         authority: bytes,
+        values: Mapping[str, object],
     ) -> None:
         self._hub, self._viewers, self._gate, self._files, self._limits = hub, viewers, gate, files, limits
-        self._authority, self._cameras = authority, cameras
+        self._authority, self._cameras, self._values = authority, cameras, values
         self._commander = ThreadPoolExecutor(limits.commands + 1, "page command")
         self._commands = 0
         self._downloads = {False: 0, True: 0}
@@ -175,7 +177,7 @@ class Answers:
         return problem(404, _NOT_YET) if self._hub.report == "null" else _json(self._hub.report)
 
     async def _openapi(self, _request: web.Request) -> web.StreamResponse:
-        return _json(json_text(description()))
+        return _json(json_text(description(self._values)))
 
     async def _authority_file(self, _request: web.Request) -> web.StreamResponse:
         if not self._authority:

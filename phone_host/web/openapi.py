@@ -1,5 +1,6 @@
 """Describes the HTTP API for programs, as OpenAPI 3.1. Pure."""
 
+from collections.abc import Mapping
 from typing import Final
 
 from common.versions import PACKAGE_VERSION
@@ -26,14 +27,18 @@ _REFUSED: Final = (401, 403, 421, 429)
 
 _DO: Final = (
     "`record` begins a recording (MCAP) beside the run that goes on, in a new file of the folder `recordings`; `end_recording` ends it."
-    " How it goes stands in the state: `live.recording`. `snapshot` saves the newest pair. `set` takes options of `phone-host run` as"
-    " values, `enrol` link and code, `calibrate` board and square, `scan` voxel, box, mat, object, turntable and unseen, which may be missing, `crop` box, `check_model` bed,"
+    " How it goes stands in the state: `live.recording`. `snapshot` saves the newest pair. `set`, `calibrate` and `scan` take as values the options"
+    " that the schema of their name lists, `enrol` link and code, `crop` box, `check_model` bed,"
     " `save_model` format, `prepare_print` printer and bed, `print` confirm: what `printing.asks` says; the others take none."
 )
 
 
-def description() -> _Json:
-    """Return the description."""
+def description(values: Mapping[str, object]) -> _Json:
+    """Return the description.
+
+    Args:
+        values: schemas of what commands take, by name.
+    """
     return {
         "openapi": "3.1.0",
         "info": {
@@ -63,7 +68,7 @@ def description() -> _Json:
             "/api/measure": _post("Measure one or two points of the rectified left image", "Points", "Measured"),
         },
         "components": {
-            "schemas": _schemas(),
+            "schemas": {**_schemas(), **values},
             "securitySchemes": {
                 "token": {"type": "http", "scheme": "bearer"},
                 "cookie": {"type": "apiKey", "in": "cookie", "name": "tandemscan"},

@@ -55,6 +55,7 @@ class Serving:
             files=files,
             limits=limits,
             authority=authority,
+            values=settings.values,
         )
         app = web.Application(middlewares=[door.middleware()], client_max_size=limits.body_bytes)
         app.add_routes(self._answers.routes())

@@ -1,7 +1,7 @@
 """What the page's server is started with. Light: nothing of the server is imported."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -43,6 +43,7 @@ class PageSettings:
         token: the secret in the first URL; empty: a new one.
         credentials: for https; None: http, on loopback only.
         page: folder of the page's files; None: the package's own.
+        values: JSON schemas of what commands take, by name, for the API's description.
     """
 
     host: str = DEFAULT_HOST
@@ -51,6 +52,7 @@ class PageSettings:
     token: str = ""
     credentials: Credentials | None = None
     page: Path | None = None
+    values: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse a page that others could read on their way.

@@ -249,9 +249,8 @@ class Command:
 
     Attributes:
         do: what.
-        values: for SET, options by name, an empty value takes one back; for ENROL `link` and `code`; for CALIBRATE
-            `board` and `square`, and `out`, the rig.yaml to write, where it is not the usual one; for SCAN `voxel`, `box`, `mat` (a sheet, or usual), `object` (yes), `turntable` (yes)
-            and `unseen` (fill, pink or cut), which may be missing; for CROP, while a scan goes on, `box`; for CHECK_MODEL `bed`; for SAVE_MODEL `format`; for
+        values: for SET, CALIBRATE and SCAN, options of the command `run`, `calibrate` or `scan` by name, in SET an empty value takes
+            one back; for ENROL `link` and `code`; for CROP, while a scan goes on, `box`; for CHECK_MODEL `bed`; for SAVE_MODEL `format`; for
             PREPARE_PRINT `printer` and `bed`; for PRINT `confirm`, the state's `printing.asks`. Empty for the others.
     """
 

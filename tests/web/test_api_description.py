@@ -24,7 +24,7 @@ from tests.support.stereo_pages import processed
 EXAMPLES = int(os.environ.get("EXAMPLES", "15"))
 
 # Event streams never end: tests/system/test_page_server.py reads them.
-SCHEMA = schemathesis.openapi.from_dict(description()).exclude(path="/api/events")
+SCHEMA = schemathesis.openapi.from_dict(description({})).exclude(path="/api/events")
 OPERATIONS = {found.ok().label: found.ok() for found in SCHEMA.get_all_operations() if isinstance(found, Ok)}
 
 WITH_INPUT = [label for label, operation in OPERATIONS.items() if "{" in label or operation.method == "post"]
@@ -61,7 +61,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 def test_the_server_tells_its_description(server: PageServer) -> None:
     """What a program loads is what is tested here."""
     told = schemathesis.openapi.from_url(f"{server.address}api/openapi.json")
-    assert told.raw_schema == description()
+    assert told.raw_schema == description({})
 
 
 @pytest.mark.parametrize("label", OPERATIONS)

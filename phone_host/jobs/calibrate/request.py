@@ -49,6 +49,7 @@ class CalibrateRequest(Request):
     )
     live: bool = option(
         "--live",
+        page=False,
         action="store_true",
         help="take the pictures now, from both cameras: says what to show, takes each view by itself, ends when it is enough",
     )
@@ -63,6 +64,7 @@ class CalibrateRequest(Request):
     )
     sound: bool = option(
         "--sound",
+        page=False,
         group="cameras and links",
         action=argparse.BooleanOptionalAction,
         default=True,
@@ -70,6 +72,7 @@ class CalibrateRequest(Request):
     )
     snapshots: Path | None = option(
         "--snapshots",
+        page=False,
         group="cameras and links",
         type=Path,
         metavar="DIR",
@@ -98,18 +101,21 @@ class CalibrateRequest(Request):
     )
     earlier: Path | None = option(
         "--from",
+        page=False,
         type=Path,
         metavar="rig.yaml",
         help="add these pictures to those of an earlier calibration; --board and --square are then as they were",
     )
     pose_only: bool = option(
         "--pose-only",
+        page=False,
         group="calibration",
         action="store_true",
         help="with --from: keep its lenses, compute only how the cameras stand to each other, from these pictures alone",
     )
     imported: tuple[Path, ...] | None = option(
         "--import",
+        page=False,
         nargs="+",
         type=Path,
         metavar="FILE",
@@ -119,6 +125,7 @@ class CalibrateRequest(Request):
     )
     unit_m: float | None = option(
         "--unit",
+        page=False,
         group="other programs",
         read=lambda text, name: length_mm(text, name, "1mm") / 1000,
         metavar="1mm",
@@ -126,6 +133,7 @@ class CalibrateRequest(Request):
     )
     sizes_px: Sizes | None = option(
         "--size",
+        page=False,
         group="other programs",
         read=_sizes_px,
         metavar="WxH",
@@ -133,6 +141,7 @@ class CalibrateRequest(Request):
     )
     exports: tuple[str, ...] = option(
         "--export",
+        page=False,
         action="append",
         choices=EXPORTS,
         default=[],

@@ -1,14 +1,29 @@
 """What the page is set to: choices as a command line, what is kept of them, and its address."""
 
 import shlex
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 
 from common.errors import DataError, SettingsError
+from common.program.request import options_of
+from phone_host.declared_settings import PhoneHostSettings
+from phone_host.jobs.calibrate.request import CalibrateRequest
 from phone_host.jobs.run_request import RunRequest
+from phone_host.jobs.scan_request import ModelOptions
 from phone_host.output.axes import Axes
-from phone_host.serve.choices import choices_of, request_of, shown_words, with_changes, without_depth, words_of
+from phone_host.serve.choices import (
+    choices_of,
+    options_by_flag,
+    page_options,
+    request_of,
+    shown_words,
+    value_schemas,
+    with_changes,
+    without_depth,
+    words_of,
+)
 from phone_host.serve.commands import Commands
 from phone_host.serve.kept_choices import keep, load_choices
 from phone_host.serve.page import address_of, page_settings
@@ -37,6 +52,30 @@ def test_choices_are_a_command_line_and_back() -> None:
         "calibration": f"{home}/r.yaml",
         "out": str(Path("scan").absolute()),
     }
+
+
+def test_the_page_may_set_what_the_option_tables_say() -> None:
+    """Of a run all but what concerns the program; what the settings file may set are options of a run, read alike."""
+    assert options_by_flag(RunRequest).keys() - page_options(RunRequest) == {
+        "config", "keys", "lan", "log-level", "serve", "wait",
+    }  # fmt: skip
+    assert set(page_options(ModelOptions)) == {"mat", "object", "voxel", "box", "unseen", "turntable"}
+    assert {"live", "import", "export", "from", "snapshots"}.isdisjoint(page_options(CalibrateRequest))
+    settings, options = options_of(PhoneHostSettings), options_of(RunRequest)
+    assert settings.keys() == {item.name for item in fields(PhoneHostSettings)}
+    for name, setting in settings.items():
+        assert replace(options[name], group="", often=False) == setting
+    for do, kind in (("set", RunRequest), ("calibrate", CalibrateRequest), ("scan", ModelOptions)):
+        assert value_schemas()[f"{do}_values"]["properties"].keys() == page_options(kind).keys()  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("kind", "verb", "name"), [(CalibrateRequest, "calibrate", "views"), (RunRequest, "run", "pairs")]
+)
+def test_a_value_is_refused_in_the_words_of_its_command(kind: type, verb: str, name: str) -> None:
+    """The remedy names the command that has the option."""
+    with pytest.raises(SettingsError, match=f"--{name} is 'x'.*phone-host {verb} --help"):
+        request_of({name: "x"}, kind, verb)
 
 
 @pytest.mark.parametrize(

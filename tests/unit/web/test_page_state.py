@@ -32,7 +32,7 @@ def test_an_idle_program_has_nothing_live() -> None:
     assert values["live"] is None
     assert values["report"] is None
     assert values["trouble"] == {"problem": "no board is chosen", "remedy": "choose one first"}
-    schemas = description()["components"]["schemas"]  # type: ignore[index]
+    schemas = description({})["components"]["schemas"]  # type: ignore[index]
     assert set(schemas["State"]["required"]) <= set(values)
     assert told(PageState(activity=Activity.ENDING, guide={"coverage": 0.5}))["guide"] == {"coverage": 0.5}
 

@@ -34,9 +34,7 @@ def test_wrong_usage_is_one_line_and_exit_2(
     arguments: list[str], start: str, culprit: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Errors of the command or of a verb are one line on stderr that names the culprit, without the usage."""
-    with pytest.raises(SystemExit) as caught:
-        sample().parse_args(arguments)
-    assert caught.value.code == 2
+    assert run_command(sample(), arguments, lambda _: 0) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.startswith(start)
@@ -112,19 +110,16 @@ def test_an_error_that_is_not_stdouts_is_not_called_so() -> None:
 )
 def test_a_mistake_of_typing_is_named(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
     """The line says which word is wrong and, if a known one is close, what was probably meant."""
-    with pytest.raises(SystemExit):
-        sample().parse_args(arguments)
+    assert run_command(sample(), arguments, lambda _: 0) == 2
     assert told in capsys.readouterr().err
 
 
-def test_an_empty_path_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_empty_path_is_refused() -> None:
     """To a shell variable that is not set, `--out "$OUT"` must not mean the current folder."""
     parser = ExamplesFirstParser("sample", description="")
     parser.add_argument("--out", type=Path)
-    with pytest.raises(SystemExit) as leaving:
+    with pytest.raises(SettingsError, match="--out is empty"):
         parser.parse_args(["--out", ""])
-    assert leaving.value.code == 2
-    assert "--out is empty" in capsys.readouterr().err
     assert parser.parse_args(["--out", "."]).out == Path()
 
 
