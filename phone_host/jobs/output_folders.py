@@ -3,15 +3,13 @@
 import errno
 import os
 import re
-import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
 from common.errors import SettingsError, UnavailableError
 from common.places import Kind, kind_of, nearest, resolved
-from common.program.terminal import say
 from phone_host.output.folder_lock import lock_for_command
 from phone_host.output.listed import ListedFolder
 from phone_host.output.report_owner import PAGE, report_owner
@@ -106,12 +104,13 @@ def spare_inputs(out: Path, names: str, inputs: Mapping[str, Path]) -> None:
             )
 
 
-def announce_other_report(folder: Path, command: str) -> None:
-    """Say under which names another command's report and page stay when this one's take their places. Until then nothing changes.
+def announce_other_report(folder: Path, command: str, tell: Callable[[str], None]) -> None:
+    """Tell under which names another command's report and page stay when this one's take their places. Until then nothing changes.
 
     Args:
         folder: folder for the results.
         command: the verb whose results go there.
+        tell: takes a line that the user should know.
 
     Raises:
         UnavailableError: they are not ours to rename, or the folder cannot be written to.
@@ -124,7 +123,7 @@ def announce_other_report(folder: Path, command: str) -> None:
             names = " and ".join(listed.renamed.values())
     except OSError as error:
         raise unwritable(folder, error) from error
-    say(f"phone-host: what {owner} has written in {folder} stays there as {names}", sys.stderr)
+    tell(f"what {owner} has written in {folder} stays there as {names}")
 
 
 def stale_page(folder: Path, command: str) -> tuple[str, ...]:

@@ -1,7 +1,6 @@
 """Pictures as a command names them: files, folders or globs of both sides, or a recording, out of which the stillest are chosen; and how their pairs are matched."""
 
 import re
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,7 +10,6 @@ from typing import Final
 
 from common.errors import SettingsError
 from common.places import resolved
-from common.program.terminal import say
 from common.recording.opened import is_recording
 from phone_host.jobs.depth import DepthOptions
 from phone_host.jobs.options import ImageOptions
@@ -20,7 +18,7 @@ from phone_host.jobs.stereo_core import core_for_files, require_cameras
 from phone_host.model import Side
 from phone_host.recording.chosen_views import choose_views
 from phone_host.run.file_pairs import FilePairs, Matching
-from phone_host.run.progress_bar import StepBar, share_bar, step_bar
+from phone_host.run.progress_bar import StepBar, share_bar, step_bar, tell
 from phone_host.settings import most_pixels
 from phone_host.stereo.default_matcher import default_matcher, default_note
 from phone_host.stereo.view_files import pair_files
@@ -168,7 +166,7 @@ def file_pairs(
         matcher_note="" if depth.matcher else default_note(),
         most_pixels=limit,
         mounted=pictures.mounted,
-        tell=lambda line: say(f"phone-host: {line}", sys.stderr, flush=True),
+        tell=tell,
     )
 
 
@@ -195,7 +193,7 @@ def require_place(pairs: FilePairs, names: str, command: str) -> None:
     for _, left, right in files.pairs:
         spare_inputs(out, names, {"LEFT": left, "RIGHT": right})
     require_alone(out)
-    announce_other_report(out, command)
+    announce_other_report(out, command, tell)
 
 
 @contextmanager

@@ -58,6 +58,7 @@ class Opened:
         keys: folder that remembers it.
         core: computes depth; None: nobody asked for it.
         board_side: which view the board's camera gives.
+        tell: takes a line that the user should know.
     """
 
     request: RunRequest
@@ -68,6 +69,7 @@ class Opened:
     keys: Path
     core: StereoCore | None
     board_side: Side
+    tell: Callable[[str], None]
 
     def prepared(
         self, words: Sequence[str], sinks: Sequence[Sink] = (), told: Mapping[str, object] | None = None
@@ -90,7 +92,7 @@ class Opened:
             for link in self.links:
                 opened.enter_context(closing(link))
             if self.request.out is not None:
-                announce_other_report(self.request.out, "run")
+                announce_other_report(self.request.out, "run", self.tell)
             settings = _host_settings(self, words, told)
             recording = self._recording(settings)
             if recording is not None and self.request.record_topics:
@@ -240,7 +242,7 @@ def open_run(
         keys = key_folder(settings.keys)
         named, links = open_named(settings.link, keys, patience_s(request.cameras.wait_s, request.duration_s))
         opened.pop_all()
-    return Opened(request, found, camera, links, tuple(named), keys.path, core, board_side)
+    return Opened(request, found, camera, links, tuple(named), keys.path, core, board_side, tell)
 
 
 def _open_replay(
@@ -259,7 +261,8 @@ def _open_replay(
     core, board_side = _core(request, settings, size_px, tell, playback.board_side, rig=rig)
     overlay_of(request.depth, core)
     budget_wanted(request, found, core)
-    return Opened(request, found, playback, (), (str(playback.file),), key_folder(settings.keys).path, core, board_side)
+    keys = key_folder(settings.keys).path
+    return Opened(request, found, playback, (), (str(playback.file),), keys, core, board_side, tell)
 
 
 def replayed(uri: str) -> str:

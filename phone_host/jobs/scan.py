@@ -126,7 +126,7 @@ def open_scan(
     run = read_request(RunRequest, {**own, **told, "out": None})
     axes = axes_beside(request.depth.axes, wanted)
     found = checked(run)
-    _require(request, found.values)
+    _require(request, found.values, tell)
     resumed = resumed_of(request, tell)
     logs.set_up(log_level(found.values.log_level))
     opened, signals = open_metric_run(run, found, tell), StopSignals()
@@ -189,7 +189,7 @@ def prepare_scan(
     return PreparedScan(prepared, live, out, found.values.matcher, axes, tell)
 
 
-def _require(request: ScanRequest, settings: PhoneHostSettings) -> None:
+def _require(request: ScanRequest, settings: PhoneHostSettings, tell: Callable[[str], None]) -> None:
     """Refuse options that give no depth in metres, those that only files know, and a folder that cannot be written to, or would lose the inputs."""
     if request.replay is None and not settings.camera:
         raise SettingsError(
@@ -209,7 +209,7 @@ def _require(request: ScanRequest, settings: PhoneHostSettings) -> None:
     inputs = {"--calibration": depth.calibration, "--replay": request.replay, "--overlay": depth.overlay}
     spare_inputs(out, NAMES, {name: Path(path) for name, path in inputs.items() if path})
     require_alone(out)
-    announce_other_report(out, "scan")
+    announce_other_report(out, "scan", tell)
 
 
 def _no_metres() -> SettingsError:

@@ -3,6 +3,7 @@
 It fits its terminal: on a phone's, the words wrap and the bar makes room, so that no number is cut.
 """
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
@@ -21,6 +22,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.table import Column
+
+from common.program.terminal import say
 
 _WIDE: Final = 76
 """Characters for the longest description (40), a bar and two numbers."""
@@ -61,6 +64,11 @@ def announce(stage: str, console: Console) -> None:
     """Say in one line that a stage begins, where its bar is hidden: in a pipe, a log or a service."""
     if not console.is_terminal:
         print(f"phone-host: {stage}", file=console.file, flush=True)
+
+
+def tell(line: str) -> None:
+    """Print a line that the user should know on stderr."""
+    say(f"phone-host: {line}", sys.stderr, flush=True)
 
 
 class ShareBar:

@@ -44,7 +44,7 @@ from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.output.rig_yaml import write_time_offset
 from phone_host.recording.footage import Footage, film, keep, read, read_recording
-from phone_host.run.progress_bar import share_bar
+from phone_host.run.progress_bar import share_bar, tell
 from phone_host.serve.page import camera_page
 from phone_host.settings import key_folder
 from phone_host.stereo.raw_images import decode_frame
@@ -102,7 +102,7 @@ def run(request: CalibrateTimeRequest) -> int:
     if request.out is not None:
         require_folder(request.out)
         require_alone(request.out)
-        announce_other_report(request.out, "calibrate-time")
+        announce_other_report(request.out, "calibrate-time", tell)
         claim_names(request.out, request.out, *_FILES)
     signals = StopSignals()
     footage = _footage(request, signals)

@@ -21,6 +21,7 @@ from phone_host.jobs.run_request import RunRequest, checked
 from phone_host.output.json_text import json_text
 from phone_host.report.summary import summary
 from phone_host.run.host_settings import EndReason
+from phone_host.run.progress_bar import tell
 from phone_host.run.terminal_view import LiveTable
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def run(request: RunRequest) -> int:
     found = checked(request)
     logs.set_up(log_level(found.values.log_level))
     with _page(request, found) as page:  # first of all, because a browser gives its camera by it
-        opened = open_run(request, found, _tell, None if page is None else page.feed)
+        opened = open_run(request, found, tell, None if page is None else page.feed)
         signals = StopSignals()
         prepared = opened.prepared(sys.argv, () if page is None else (page.sink(opened.core, opened.named),))
         if page is not None:
@@ -112,7 +113,7 @@ def _finish(
     text = json_text(written.report) if request.as_json else headed(told, columns(), rows())
     print(text, flush=host.has_given_up)
     if request.as_json and snapshot.shortfall:
-        _tell(snapshot.shortfall)
+        tell(snapshot.shortfall)
     if signals.interrupted and host.has_given_up:
         leave()  # the interpreter's end would wait for native code
     if signals.interrupted:
@@ -121,10 +122,6 @@ def _finish(
     too_few = too_few or (ended is EndReason.SECONDS_OVER and not snapshot.processed)
     is_wrong = not is_stopped and (depth_is_wrong(snapshot) or nothing_whole(snapshot))
     return CHECK_FAILED if too_few or is_wrong or not written.is_complete else 0
-
-
-def _tell(line: str) -> None:
-    say(f"phone-host: {line}", sys.stderr)
 
 
 class WaitingNote:

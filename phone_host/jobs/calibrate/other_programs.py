@@ -32,6 +32,7 @@ from phone_host.output.rig_yaml import read_rig_views
 from phone_host.report.calibration_lines import REFUSED, earlier_words
 from phone_host.report.calibration_report import Exported, ImportReport
 from phone_host.report.calibration_result import import_values
+from phone_host.run.progress_bar import tell
 from phone_host.stereo.rectify import rectify_rig
 from phone_host.stereo.reproject import disparities_for_near
 
@@ -65,7 +66,7 @@ def import_calibration(request: CalibrateRequest) -> tuple[ImportReport, list[st
     found = replace(found, rig=_on_side(found.rig, side))
     if not same:
         require_own(request.out)
-        announce_other_report(request.out.parent, "calibrate")
+        announce_other_report(request.out.parent, "calibrate", tell)
         claim_names(request.out.parent, request.out, request.out.name, REPORT)
     report = ImportReport(imported=found, exported=write_exports(request, found.rig, rectification, found.files))
     if not same:

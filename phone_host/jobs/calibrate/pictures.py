@@ -48,7 +48,7 @@ from phone_host.report.calibration_lines import pairing_notes, passed_over_notes
 from phone_host.report.calibration_report import CalibrationReport, Judged
 from phone_host.report.calibration_result import calibration_values
 from phone_host.report.calibration_shown import series_of_failure, series_of_rig, with_rectified, write_page
-from phone_host.run.progress_bar import step_bar
+from phone_host.run.progress_bar import step_bar, tell
 from phone_host.settings import most_pixels
 from phone_host.stereo.view_files import ViewFiles, pair_files, passed_over
 
@@ -126,7 +126,7 @@ def calibrate_pictures(
         request = replace(request, board_side=request.board_side or given.board_side)  # what the user says counts more
     files = pair_files(given.left, given.right)
     require_first_sizes(files, asked, request)
-    announce_other_report(out.parent, "calibrate")
+    announce_other_report(out.parent, "calibrate", tell)
     claim_names(out.parent, out, REPORT, PAGE)
     beside = cameras_beside(files, mounted)
     series, known = series_of(request, asked, lambda named: board_in(files, named, limit))

@@ -73,7 +73,7 @@ def test_the_key_command_decides(tmp_path: Path, verb: str) -> None:
     """Whatever else stands in it, a report is that of the verb it names; no other verb takes it for its own."""
     everything = {"command": verb, "truth": {}, "ended": "", "verdict": "", "time_offset_ns": 0, "matcher": "sgbm"}
     (tmp_path / "report.json").write_text(json.dumps(everything))
-    announce_other_report(tmp_path, verb)
+    announce_other_report(tmp_path, verb, print)
     assert names(tmp_path) == {"report.json"}
 
 
@@ -94,7 +94,7 @@ def test_reports_of_older_versions_are_recognised_by_their_keys(
 ) -> None:
     """They do not name their verb; a stereo report has a verdict, too."""
     (tmp_path / "report.json").write_text(json.dumps(dict.fromkeys(keys, 1)))
-    announce_other_report(tmp_path, verb)
+    announce_other_report(tmp_path, verb, print)
     assert names(tmp_path) == {"report.json"}
 
 
@@ -118,7 +118,7 @@ def test_a_page_of_before_goes_where_its_report_is_replaced(
 def test_a_strangers_report_names_no_file(tmp_path: Path) -> None:
     """A name that is no verb of ours moves nothing, wherever it would lead."""
     (tmp_path / "report.json").write_text(json.dumps({"command": "../../x"}))
-    announce_other_report(tmp_path, "stereo")
+    announce_other_report(tmp_path, "stereo", print)
     assert names(tmp_path) == {"report.json"}
 
 

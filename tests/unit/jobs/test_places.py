@@ -131,7 +131,7 @@ def test_a_strange_replay_is_left_to_the_camera() -> None:
 def test_a_report_of_brackets_belongs_to_nobody(room: Path) -> None:
     """It is no report of another verb that would be kept."""
     (room / "report.json").write_text("[" * 200_000)
-    announce_other_report(room, "stereo")
+    announce_other_report(room, "stereo", print)
     assert (room / "report.json").stat().st_size == 200_000
 
 
