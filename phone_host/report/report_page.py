@@ -338,7 +338,8 @@ def _delays(series: DelaySeries) -> list[str]:
             f"{_FROM_DEMAND if series.timeless else _FROM_MIDDLE} {_CHART_WORDS}",
             legend(names)
             + two_widths(lambda width: budgets([mean], width))
-            + stacked_chart("delays of the pairs over time, stacked", series.time_s, series.delays),
+            + stacked_chart("delays of the pairs over time, stacked", series.time_s, series.delays)
+            + "<noscript><p>delays.jsonl has all values.</p></noscript>",
         ),
         section(
             "Each delay by itself",

@@ -94,6 +94,13 @@ def test_page_is_whole_and_needs_nothing_from_outside(pairs: int) -> None:
             assert attributes.get(name, "data:") is None or str(attributes.get(name, "data:")).startswith("data:")
 
 
+def test_without_scripts_the_page_says_where_the_values_are() -> None:
+    """The charts need JavaScript; the file beside the page does not."""
+    assert "<noscript><p>delays.jsonl has all values.</p></noscript>" in page(
+        data(delay_series([ledger(1), ledger(2)]))
+    )
+
+
 def test_page_of_no_pairs_says_so() -> None:
     """Without a pair the page shows no plot and says that there are no delays."""
     parsed = Page(page(data(delay_series([]), pictures=(), figures=())))
