@@ -48,9 +48,6 @@ Admitted = tuple[int, BoardFrame]
 class Border:
     """Clock and quarantine of one board.
 
-    Attributes:
-        quarantine: frames that wait for an echo.
-
     Args:
         account: the links' account, which counts doubts, steps and disbelieved frames.
         on_doubt: called when no frame from before this moment may be paired any more.
@@ -60,7 +57,7 @@ class Border:
         self._account = account
         self._on_doubt = on_doubt
         self._clock = LinkClocks(len(account.links))
-        self.quarantine: Quarantine[Arrival] = Quarantine()
+        self._quarantine: Quarantine[Arrival] = Quarantine()
         self._unproven = Unproven()
 
     @property
@@ -69,14 +66,19 @@ class Border:
         return self._clock.estimate
 
     @property
+    def held(self) -> int:
+        """Number of frames that wait for an echo."""
+        return len(self._quarantine.held)
+
+    @property
     def waits_for_echo(self) -> bool:
         """Whether the next echo is wanted as soon as possible."""
-        return len(self.quarantine.held) > 0 or (self._clock.estimate is None and self._clock.in_doubt)
+        return self.held > 0 or (self._clock.estimate is None and self._clock.in_doubt)
 
     @property
     def takes_frames(self) -> bool:
         """Whether a frame that came now could be of use."""
-        return self._clock.estimate is not None and len(self.quarantine.held) < _MOST_HELD
+        return self._clock.estimate is not None and self.held < _MOST_HELD
 
     def round_trip_ns(self, link: int) -> int | None:
         """Return the least recent round trip over one link, ns; None before its first echo."""
@@ -107,7 +109,7 @@ class Border:
 
     def close(self) -> None:
         """Give up the frames that wait for an echo, because none will come."""
-        for arrival in self.quarantine.void():
+        for arrival in self._quarantine.void():
             arrival.account.disbelieved[Disbelief.CLOCK] += 1
 
     def learn(self, echo: Echo) -> list[Admitted]:
@@ -142,9 +144,9 @@ class Border:
         round_trip_ns = (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns)
         if round_trip_ns <= 2 * estimate.round_trip_ns + _TIGHT_NS:
             self._unproven.confirmed(echo.t1_ns)
-            passed = self.quarantine.confirmed(echo.t1_ns, echo.t3_ns)
+            passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns)
         else:
-            passed = self.quarantine.confirmed(echo.t1_ns, echo.t3_ns - _WAIT_NS)
+            passed = self._quarantine.confirmed(echo.t1_ns, echo.t3_ns - _WAIT_NS)
         return [(arrival.link, known) for arrival in passed if (known := self._examine(arrival)) is not None]
 
     def admit(self, arrival: Arrival) -> BoardFrame | None:
@@ -162,12 +164,12 @@ class Border:
             return known
         transit_ns = arrival.received_ns - known.marks.sent_ns
         sent_ns, period_ns = arrival.frame.marks.sent_ns, arrival.camera.period_ns
-        passes = self.quarantine.arrived(arrival, sent_ns, transit_ns, period_ns, arrival.received_ns)
+        passes = self._quarantine.arrived(arrival, sent_ns, transit_ns, period_ns, arrival.received_ns)
         return known if passes else None
 
     def tick(self, now_ns: int) -> None:
         """Let time pass: drop and count frames that no echo has proven in time."""
-        for arrival in self.quarantine.expired(now_ns):
+        for arrival in self._quarantine.expired(now_ns):
             arrival.account.disbelieved[Disbelief.UNPROVEN] += 1
             self._warn(
                 "frame_unproven", arrival.account.disbelieved[Disbelief.UNPROVEN], why="the board answers no echo"

@@ -32,9 +32,6 @@ _FAREWELL_NS: Final = 300_000_000
 class Receiver:
     """Owns the links and speaks the host's role over them.
 
-    Attributes:
-        reception: that role; for the thread of this class alone.
-
     Args:
         links: open links to one board, the preferred one first; this class closes them.
         host_id: random id of this process.
@@ -54,7 +51,7 @@ class Receiver:
             )
             for number, link in enumerate(links)
         ]
-        self.reception = Reception(facts, host_id, sink, self._send)
+        self._reception = Reception(facts, host_id, sink, self._send)
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._waiter = Waiter([*(item for link in links for item in link.pollables), self._wake_read])
         self._stopping = False
@@ -68,42 +65,42 @@ class Receiver:
     @property
     def account(self) -> LinkAccount:
         """The links' account so far."""
-        return self.reception.account
+        return self._reception.account
 
     @property
     def refused(self) -> BoardRefusal | None:
         """Why the last board heard refuses this host; None if it does not, or is silent now."""
-        return self.reception.refused(now.monotonic_ns())
+        return self._reception.refused(now.monotonic_ns())
 
     @property
     def connected(self) -> bool:
         """Whether a board talks to us now."""
-        return self.reception.connected
+        return self._reception.connected
 
     @property
     def carrier(self) -> str:
         """Name of the link that carries frames now; empty while there is none."""
-        return self.reception.carrier
+        return self._reception.carrier
 
     @property
     def hello(self) -> BoardHello | None:
         """The board's description of itself; None before the first contact."""
-        return self.reception.hello
+        return self._reception.hello
 
     @property
     def locks(self) -> LockState | None:
         """How the board's camera is held, as it said in this session; None: it has not said."""
-        return self.reception.locks
+        return self._reception.locks
 
     @property
     def estimate(self) -> ClockEstimate | None:
         """The clock estimate now; None before the first echo, and while it is in doubt."""
-        return self.reception.estimate
+        return self._reception.estimate
 
     @property
     def ended(self) -> bool:
         """Whether the board's camera has reached the end of its images."""
-        return self.reception.ended
+        return self._reception.ended
 
     def start(self) -> None:
         """Start to look for the board."""
@@ -117,14 +114,14 @@ class Receiver:
 
     def steer(self, later_ns: int) -> None:
         """Ask the board's camera to expose later, in addition to earlier corrections. Safe from any thread."""
-        hello = self.reception.hello
+        hello = self._reception.hello
         self._steered_session = "" if hello is None else hello.session
         self._corrections.add(later_ns)
         self.wake()
 
     def hold(self, locks: Locks) -> None:
         """Have the board's camera held like this. Safe from any thread."""
-        self.reception.hold(locks)
+        self._reception.hold(locks)
         self.wake()
 
     def stop(self) -> None:
@@ -145,13 +142,13 @@ class Receiver:
         except Exception as error:  # noqa: BLE001 - a thread's root: the run's root reports it once
             self.failure = error
         finally:
-            self.reception.close()
+            self._reception.close()
             for link in self._links:
                 link.close()
 
     def _take_leave(self) -> None:
         """Say goodbye and wait briefly for the board's last account, which follows the last frame."""
-        reception = self.reception
+        reception = self._reception
         heard = reception.leave(now.monotonic_ns())
         deadline_ns = now.monotonic_ns() + _FAREWELL_NS
         while heard and not reception.tail_known and (left_ns := deadline_ns - now.monotonic_ns()) > 0:
@@ -168,16 +165,16 @@ class Receiver:
             if isinstance(incoming, Packet):
                 self._take(connection, incoming, now_ns)
             elif isinstance(incoming, Broken):
-                self.reception.interrupted(connection, now_ns)
+                self._reception.interrupted(connection, now_ns)
             else:
-                self.reception.count_garbage("not a packet")
+                self._reception.count_garbage("not a packet")
 
     def _step(self) -> None:
         """Wait, and do what has come or is due. Runs for each frame, so the clock is read no more often than decides something."""
         links_due_ns = _NEVER
         for link in self._links:
             links_due_ns = min(links_due_ns, link.due_ns)
-        wait_ns = min(self.reception.due_ns, links_due_ns) - self._looked_ns
+        wait_ns = min(self._reception.due_ns, links_due_ns) - self._looked_ns
         ready = self._waiter.wait(min(_LONGEST_WAIT_MS, -(-wait_ns // 1_000_000)) if wait_ns > 0 else 0)
         slept_ns, jumped = self._standstill.look()
         if slept_ns or jumped:
@@ -187,34 +184,36 @@ class Receiver:
             if self._wake_read in ready:
                 os.read(self._wake_read, 4096)
         self._looked_ns = now_ns = now.monotonic_ns()
-        self.reception.tick(now_ns)
+        self._reception.tick(now_ns)
         if self._corrections.is_due:
             self._hand_on_corrections(now_ns)
 
     def _hand_on_corrections(self, now_ns: int) -> None:
         """Send due corrections to the board once a link is up. Discard corrections for an earlier session."""
-        hello = self.reception.hello
-        if hello is None or not self.reception.carrier:
+        hello = self._reception.hello
+        if hello is None or not self._reception.carrier:
             return
         if (later_ns := self._corrections.take()) and self._steered_session in {"", hello.session}:
-            self.reception.steer(later_ns, now_ns)
+            self._reception.steer(later_ns, now_ns)
 
     def _note_standstill(self, slept_ns: int) -> None:
         """Handle that this machine's clock stood still, or may have, before taking anything that came meanwhile."""
         if slept_ns:
-            self.reception.slept(slept_ns, now.monotonic_ns())
+            self._reception.slept(slept_ns, now.monotonic_ns())
         else:
-            self.reception.doubt_clock("the time of day was set: this machine may have stood still", now.monotonic_ns())
+            self._reception.doubt_clock(
+                "the time of day was set: this machine may have stood still", now.monotonic_ns()
+            )
 
     def _take(self, connection: bytes, packet: Packet, now_ns: int) -> None:
         try:
             message = decode(packet.header, packet.payload)
         except VersionError as error:
-            self.reception.refuse_version(connection, error.theirs, now_ns)
+            self._reception.refuse_version(connection, error.theirs, now_ns)
         except ProtocolError as error:
-            self.reception.count_garbage(error.problem)
+            self._reception.count_garbage(error.problem)
         else:
-            self.reception.receive(connection, message, now_ns)
+            self._reception.receive(connection, message, now_ns)
 
     def _send(self, outgoing: Outgoing) -> None:
         link = self._links[outgoing.connection[0]]

@@ -13,15 +13,7 @@ from common.errors import UnavailableError
 from common.program.logs import event
 from common.protocol import session
 from common.protocol.host_session import HostSession
-from common.protocol.message import (
-    BoardHello,
-    FrameMessage,
-    Locks,
-    LockState,
-    Message,
-    RefusalReason,
-    Rung,
-)
+from common.protocol.message import BoardHello, FrameMessage, Locks, LockState, Message, RefusalReason, Rung
 from phone_host.accounts.link_account import LinkAccount, LinkTally, SessionAccount, link_names
 from phone_host.model import BoardFrame
 from phone_host.stream.border import Arrival, Border
@@ -40,7 +32,6 @@ class Reception:
     Attributes:
         account: the links' account so far.
         tail_known: whether the board has told the last account of this session.
-        border: what decides whether frames are believed.
         due_ns: when to call `tick` next even if nothing comes, ns; as of the last `tick`.
         hello: the board's description of itself; None before the first contact.
 
@@ -58,7 +49,7 @@ class Reception:
         self._session = HostSession(host_id, [link.dialled for link in links])
         self._choice = LinkChoice(len(links))
         self._boot_id = ""
-        self._hello: BoardHello | None = None
+        self.hello: BoardHello | None = None
         self._flow = Flow()
         self._streamed_over: int | None = None
         self._refusals = Refusals()
@@ -69,16 +60,11 @@ class Reception:
         self._is_paced = any(link.self_paced for link in links)
         self.tail_known = False
         self.account = LinkAccount(links=tuple(LinkTally(name) for name in link_names([link.kind for link in links])))
-        self.border = Border(self.account, sink.void)
+        self._border = Border(self.account, sink.void)
 
     def refused(self, now_ns: int) -> BoardRefusal | None:
         """Return why the last board heard refuses this host; None if it does not, or is silent now."""
         return self._refusals.last(now_ns)
-
-    @property
-    def hello(self) -> BoardHello | None:
-        """The board's description of itself; None before the first contact."""
-        return self._hello
 
     @property
     def connected(self) -> bool:
@@ -99,7 +85,12 @@ class Reception:
     @property
     def estimate(self) -> ClockEstimate | None:
         """The clock estimate now; None before the first echo, and while it is in doubt."""
-        return self.border.estimate
+        return self._border.estimate
+
+    @property
+    def held(self) -> int:
+        """Number of frames that wait for an echo."""
+        return self._border.held
 
     @property
     def ended(self) -> bool:
@@ -119,10 +110,10 @@ class Reception:
             if isinstance(lost, session.StaleReason):
                 self.account.current.count_stale(lost)
             else:
-                self.accept_frame(message, lost, link, now_ns)
+                self._accept_frame(message, lost, link, now_ns)
             return
         self._has_news = True
-        self.handle(self._session.receive(connection, message, now_ns), now_ns)
+        self._handle(self._session.receive(connection, message, now_ns), now_ns)
 
     def refuse_version(self, connection: bytes, theirs: int, now_ns: int) -> None:
         """Take note of a message of another protocol version.
@@ -143,7 +134,7 @@ class Reception:
     def interrupted(self, connection: bytes, now_ns: int) -> None:
         """Take note that a connection broke."""
         self._has_news = True
-        self.handle(self._session.interrupted(connection, now_ns), now_ns)
+        self._handle(self._session.interrupted(connection, now_ns), now_ns)
 
     def tick(self, now_ns: int) -> None:
         """Do what is due, and grant credit if there is room for frames."""
@@ -155,24 +146,24 @@ class Reception:
     def _attend(self, now_ns: int) -> None:
         """Do what is due. A frame that passes makes nothing due: it only shows that its link is alive."""
         self._has_news = False
-        if self.border.waits_for_echo:
+        if self._border.waits_for_echo:
             self._has_news = True
-            self.border.tick(now_ns)
+            self._border.tick(now_ns)
             self._session.probe(now_ns)
         if self._locks.is_due(now_ns):
-            self.handle(self._session.set_locks(self._locks.wanted), now_ns)
+            self._handle(self._session.set_locks(self._locks.wanted), now_ns)
         due_ns = self._session.due_ns
         if now_ns >= due_ns:
-            self.handle(self._session.tick(now_ns), now_ns)
+            self._handle(self._session.tick(now_ns), now_ns)
             if self._is_choosing and (best := self._choice.best(now_ns)) is not None:
-                self.handle(self._session.carry(best, now_ns), now_ns)
+                self._handle(self._session.carry(best, now_ns), now_ns)
             due_ns = self._session.due_ns
         self.due_ns = due_ns
 
     def steer(self, later_ns: int, now_ns: int) -> None:
         """Ask the board's camera to expose later, by `later_ns` modulo its period. Without a board, do nothing."""
-        if self._hello is not None:
-            self.handle(self._session.steer(later_ns % self._hello.camera.period_ns), now_ns)
+        if self.hello is not None:
+            self._handle(self._session.steer(later_ns % self.hello.camera.period_ns), now_ns)
 
     def hold(self, locks: Locks) -> None:
         """Have the board's camera held like this, in this session and every later one."""
@@ -182,24 +173,24 @@ class Reception:
     def slept(self, slept_ns: int, now_ns: int) -> None:
         """Take note that this machine has slept: its clock stood still while the board's and the cameras' went on."""
         self._has_news = True
-        self.border.slept(slept_ns)
-        self.handle(self._session.begin_clock(now_ns), now_ns)
+        self._border.slept(slept_ns)
+        self._handle(self._session.begin_clock(now_ns), now_ns)
 
     def doubt_clock(self, why: str, now_ns: int) -> None:
         """Take note that this machine's clock may have stood still. An echo asked for from now on will tell."""
         self._has_news = True
-        self.border.void(why)
-        self.handle(self._session.begin_clock(now_ns), now_ns)
+        self._border.void(why)
+        self._handle(self._session.begin_clock(now_ns), now_ns)
 
     def leave(self, now_ns: int) -> bool:
         """Say goodbye. Return whether a board hears it; it will answer with its last account (`tail_known`)."""
         farewell = self._session.leave()
-        self.handle(farewell, now_ns)
+        self._handle(farewell, now_ns)
         return bool(farewell)
 
     def close(self) -> None:
         """Take note that nothing more will come."""
-        self.border.close()
+        self._border.close()
 
     def lose_tail(self) -> None:
         """Take note that the last account did not come: what the board sent since the newest account is unknown."""
@@ -212,22 +203,22 @@ class Reception:
             _LOG.warning(event("garbage", count=self.account.garbage, problem=problem))
 
     def _grant(self, now_ns: int) -> None:
-        if self._hello is None:
+        if self.hello is None:
             return
         if (frames := self._sink.room()) is None:
             round_trip_ns = self._paced_round_trip_ns() if self._is_paced else None
-            frames = self._flow.credit(self._session.outstanding, self._hello.camera.period_ns, round_trip_ns)
-        if frames and self.border.takes_frames:  # without a clock, frames could not be paired
-            self.handle(self._session.grant(frames), now_ns)
+            frames = self._flow.credit(self._session.outstanding, self.hello.camera.period_ns, round_trip_ns)
+        if frames and self._border.takes_frames:  # without a clock, frames could not be paired
+            self._handle(self._session.grant(frames), now_ns)
 
     def _paced_round_trip_ns(self) -> int | None:
         """Round trip of the carrier if it paces itself, ns; 0 before its first echo."""
         carrier = self._session.carrier
         if carrier is None or not self._links[carrier].self_paced:
             return None
-        return self.border.round_trip_ns(carrier) or 0
+        return self._border.round_trip_ns(carrier) or 0
 
-    def handle(self, outputs: list[session.Output], now_ns: int) -> None:
+    def _handle(self, outputs: list[session.Output], now_ns: int) -> None:
         """Do what the session says, save for frames: those come by a shorter way, see `receive`."""
         for output in outputs:
             assert not isinstance(output, session.Arrived | session.Stale)
@@ -256,9 +247,9 @@ class Reception:
     def _note_clock(self, echo: session.Echo | session.ClockVoid, now_ns: int) -> None:
         """Give an echo to the clock and pass the frames that it has proven; or restart the clock if it is void."""
         if isinstance(echo, session.ClockVoid):
-            self.border.void("the board had not heard this host for a while")
+            self._border.void("the board had not heard this host for a while")
             return
-        for passed in self.border.learn(echo):
+        for passed in self._border.learn(echo):
             self._pass(*passed)
         self._choice.echo(echo.link, (echo.t3_ns - echo.t0_ns) - (echo.t2_ns - echo.t1_ns), now_ns)
 
@@ -291,7 +282,7 @@ class Reception:
 
     def _note_gone(self, *, orderly: bool, now_ns: int) -> None:
         """Take note that the board has gone from all links."""
-        self.border.close()
+        self._border.close()
         self.account.current.vanished = not orderly
         if not self.account.current.ended:
             self.account.board_left(now_ns)
@@ -309,19 +300,19 @@ class Reception:
                 self._refusals.link_up(link)
                 if hello.boot_id != self._boot_id:
                     self._boot_id = hello.boot_id
-                    self.border.other_clock()
+                    self._border.other_clock()
                 self._choice.up(link, now_ns)
                 _LOG.info(event("link_up", link=tally.name))
             case session.LinkDown(link, stuck):
                 tally.is_up = stuck
                 tally.lost += 1
-                self.border.link_down(link)
+                self._border.link_down(link)
                 self._choice.down(link, now_ns)
                 if stuck:
                     self._choice.up(link, now_ns)
                 _LOG.info(event("link_down", link=tally.name, stuck=stuck))
             case session.OtherBoard(link, hello):
-                ours = self._hello
+                ours = self.hello
                 names = " and ".join(tally.name for tally in self.account.links)
                 if tally.frames or tally.lost or ours is None:  # it was right once: somebody has moved a cable
                     _LOG.warning(event("other_board", link=tally.name, camera=hello.camera.name))
@@ -336,7 +327,7 @@ class Reception:
     def _begin(self, accepted: session.Accepted, now_ns: int) -> None:
         hello, link = accepted.hello, accepted.link
         self._refusals.accepted()
-        self._hello = hello
+        self.hello = hello
         self._flow = Flow()
         self.tail_known = False
         self._choice.carries(link, now_ns)
@@ -366,30 +357,30 @@ class Reception:
 
     def _note_rung(self, rung: Rung) -> None:
         """Adopt the new rung of the board's camera."""
-        assert self._hello is not None
-        self._hello = replace(self._hello, camera=replace(self._hello.camera, period_ns=rung.period_ns), rung=rung)
+        assert self.hello is not None
+        self.hello = replace(self.hello, camera=replace(self.hello.camera, period_ns=rung.period_ns), rung=rung)
         self.account.current.rung = rung
         self._sink.change_period(rung.period_ns)
         fps = round(1e9 / rung.period_ns, 2)
         _LOG.info(event("board_camera_stepped", rung=rung.index, last=rung.last, fps=fps, quality=rung.quality))
 
-    def accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
+    def _accept_frame(self, frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
         """Count a frame of the present session and give it to the border."""
         account, tally = self.account.sessions[-1], self.account.links[link]
         account.received += 1
         account.lost += lost
         tally.frames += 1
         tally.bytes += len(frame.payload)
-        assert self._hello is not None
-        arrival = Arrival(frame, link, account, self._hello.camera, now_ns)
-        if (believed := self.border.admit(arrival)) is None:
+        assert self.hello is not None
+        arrival = Arrival(frame, link, account, self.hello.camera, now_ns)
+        if (believed := self._border.admit(arrival)) is None:
             self._has_news = True
         else:
             self._pass(link, believed)
 
     def _pass(self, link: int, frame: BoardFrame) -> None:
         """Pass a believed frame to the sink, if the sink wants it."""
-        assert self._hello is not None
+        assert self.hello is not None
         if (objection := self._sink.objection(frame)) is not None:
             self.account.current.disbelieved[objection] += 1
             return
@@ -397,9 +388,7 @@ class Reception:
         transit_ns = frame.received_ns - marks.sent_ns
         if self._is_choosing:
             self._choice.frame(link, transit_ns, frame.received_ns)
-        self._flow.arrived(
-            transit_ns, marks.sent_ns - marks.grabbed_ns, self._hello.camera.period_ns, frame.received_ns
-        )
+        self._flow.arrived(transit_ns, marks.sent_ns - marks.grabbed_ns, self.hello.camera.period_ns, frame.received_ns)
         self.account.links[link].age.add(frame.received_ns - marks.exposed_ns)
-        self.border.passed(message)
+        self._border.passed(message)
         self._sink.add_board(frame)

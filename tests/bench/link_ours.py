@@ -15,8 +15,9 @@ from common.link.base import Link
 from common.link.factory import open_link, parse_link
 from common.link.stream import StreamLink
 from common.protocol.framing import LinkEnd
-from common.protocol.message import FrameMessage, Pacing
+from common.protocol.message import FrameMessage, Message, Pacing
 from phone_host.stream.receiver import Receiver
+from phone_host.stream.reception import Reception
 from tests.bench.link_job import Job, Tally
 from tests.support.unkept import Unkept
 
@@ -83,14 +84,15 @@ def receive_tandemscan(job: Job) -> Tally:
 
     sink = Unkept(None if job.fps else _SLOTS)
     receiver = Receiver([_open(job.address)], now.random_id(), sink)
-    take_in = receiver.reception.accept_frame
+    take_in = Reception.receive
 
-    def stamped(frame: FrameMessage, lost: int, link: int, now_ns: int) -> None:
-        """Stamp a frame once it is decoded and the session has taken it, before the host decides whether to believe it."""
-        tally.arrived(frame.sequence, frame.marks.sent_ns, len(frame.payload))
-        take_in(frame, lost, link, now_ns)
+    def stamped(reception: Reception, connection: bytes, message: Message, now_ns: int) -> None:
+        """Stamp a frame once it is decoded, before the host decides whether to believe it."""
+        if isinstance(message, FrameMessage):
+            tally.arrived(message.sequence, message.marks.sent_ns, len(message.payload))
+        take_in(reception, connection, message, now_ns)
 
-    receiver.reception.accept_frame = stamped  # type: ignore[method-assign]
+    Reception.receive = stamped  # type: ignore[assignment]
     receiver.start()
     while not receiver.ended and receiver.failure is None:
         time.sleep(1)  # its wake-ups are no part of the link

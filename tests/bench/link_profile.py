@@ -43,7 +43,7 @@ _CALLS: Final = {
         ("phone_host.stream.receiver", "Receiver._receive"),
         ("phone_host.stream.receiver", "decode"),
         ("common.protocol.host_session", "HostSession.take_frame"),
-        ("phone_host.stream.reception", "Reception.accept_frame"),
+        ("phone_host.stream.reception", "Reception._accept_frame"),
         ("phone_host.stream.border", "Border.admit"),
         ("phone_host.stream.reception", "Reception._pass"),
         ("phone_host.stream.reception", "Reception._note_clock"),

@@ -197,7 +197,7 @@ class SteppingWorld:
         assert counts.received == counts.paired + sum(n for _, n in counts.board_orphans) + counts.held_board
         received = sum(session.received for session in account.sessions)
         dropped = sum(count for reason, count in account.disbelieved.items() if reason is not Disbelief.CREDIT)
-        waiting = len(self.reception.border.quarantine.held)
+        waiting = self.reception.held
         assert received == counts.received + account.no_clock + dropped + waiting
 
     def is_suspect(self, pair: WrongPair) -> bool:

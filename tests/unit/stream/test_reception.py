@@ -22,15 +22,7 @@ from common.protocol.message import (
     Rung,
     Status,
 )
-from common.protocol.session import (
-    MS,
-    ClockVoid,
-    OtherBoard,
-    Refused,
-    Stepped,
-    Unbelievable,
-    connection_name,
-)
+from common.protocol.session import MS, Outgoing, connection_name
 from phone_host.model import BoardFrame
 from phone_host.stream.frame_sink import FrameSink, LinkFacts, NoFrames
 from phone_host.stream.reception import Reception
@@ -234,7 +226,35 @@ class TwoLinks(Talk):
         super().__init__(sink=sink, camera=camera)
         self.far = {lane: connection_name(1, lane.name.encode()) for lane in Lane}
         facts = [LinkFacts("ipc", dict(NAMES), self_paced=False), LinkFacts("serial", dict(self.far), self_paced=True)]
-        self.reception = Reception(facts, "host", sink or self.queue, self.said.append)
+        self.reception = Reception(facts, "host", sink or self.queue, self.say)
+
+    def say(self, outgoing: Outgoing) -> None:
+        """Take what the host says."""
+        self.said.append(outgoing)
+
+
+class TwoBoards(TwoLinks):
+    """The same, but from some moment on the second link leads to another board."""
+
+    is_moved = True
+    other = BoardHello(
+        session="other",
+        boot_id="another boot",
+        camera=replace(CAMERA, name="theirs"),
+        counts=BoardCounts(),
+        rung=Rung(),
+    )
+
+    def say(self, outgoing: Outgoing) -> None:
+        """Take what the host says; the other board gets what goes over the second link."""
+        if not self.is_moved or outgoing.connection not in self.far.values():
+            super().say(outgoing)
+
+    def answer(self) -> None:
+        """Deliver what was said, and the other board's hello."""
+        super().answer()
+        if self.is_moved:
+            self.reception.receive(self.far[Lane.CONTROL], self.other, self.now_ns)
 
 
 def test_a_broken_link_costs_a_change_and_no_session() -> None:
@@ -255,23 +275,17 @@ def test_a_broken_link_costs_a_change_and_no_session() -> None:
     assert len(talk.reception.account.sessions) == 1
 
 
-def test_links_to_two_boards_are_an_error_unless_one_was_moved() -> None:
+def test_links_to_two_boards_are_an_error_unless_one_was_moved(caplog: pytest.LogCaptureFixture) -> None:
     """A second link that leads to another board from the beginning is refused with the remedy; one that was right before is only reported."""
-    talk = TwoLinks()
-    other = BoardHello(
-        session="other",
-        boot_id="another boot",
-        camera=replace(CAMERA, name="theirs"),
-        counts=BoardCounts(),
-        rung=Rung(),
-    )
+    talk = TwoBoards()
+    talk.is_moved = False
     talk.run(60)
-    moved = OtherBoard(1, other)
-    talk.reception.account.links[1].lost = 1
-    talk.reception.handle([moved], talk.now_ns)
-    talk.reception.account.links[1].lost = 0
+    talk.is_moved = True
+    talk.run(300)
+    assert "other_board" in caplog.text
+    assert talk.reception.connected
     with pytest.raises(UnavailableError) as caught:
-        talk.reception.handle([moved], talk.now_ns)
+        TwoBoards().run(300)
     assert "theirs" in caught.value.problem
     assert "--link" in caught.value.remedy
 
@@ -281,7 +295,7 @@ def test_a_link_that_is_turned_away_is_told_once(caplog: pytest.LogCaptureFixtur
     talk = TwoLinks()
     talk.run(60)
     for _ in range(5):
-        talk.reception.handle([Refused(RefusalReason.BUSY, 1)], talk.now_ns)
+        talk.reception.receive(talk.far[Lane.CONTROL], Refusal(RefusalReason.BUSY), talk.now_ns)
     assert len([record for record in caplog.records if "link_refused" in record.getMessage()]) == 1
     assert talk.reception.connected
     assert talk.reception.refused(talk.now_ns) == BoardRefusal(RefusalReason.BUSY)
@@ -302,7 +316,7 @@ def test_nonsense_is_counted_and_told_ever_more_seldom(caplog: pytest.LogCapture
     talk.run()
     for _ in range(99):
         talk.reception.count_garbage("noise")
-    talk.reception.handle([Unbelievable("noise")], talk.now_ns)
+    talk.reception.receive(NAMES[Lane.CONTROL], Status("first", BoardCounts(10**6, 10**6), Rung()), talk.now_ns)
     assert talk.reception.account.garbage == 100
     assert len([record for record in caplog.records if "garbage" in record.getMessage()]) == 7
 
@@ -311,8 +325,8 @@ def test_a_board_that_steps_to_a_lower_rate_is_gone_by() -> None:
     """After the board has reported another rung, pairing and reports use that rung's period."""
     talk = Talk()
     talk.run()
-    rung = Rung(index=2, last=3, period_ns=2 * CAMERA.period_ns)
-    talk.reception.handle([Stepped(rung)], talk.now_ns)
+    rung = Rung(index=2, last=3, changes=1, period_ns=2 * CAMERA.period_ns)
+    talk.reception.receive(NAMES[Lane.CONTROL], Status("first", BoardCounts(), rung), talk.now_ns)
     hello = talk.reception.hello
     assert hello is not None
     assert (hello.camera.period_ns, hello.rung) == (2 * CAMERA.period_ns, rung)
@@ -339,7 +353,9 @@ def test_another_boot_is_another_clock() -> None:
 UPSETS: dict[str, Callable[[Talk], None]] = {
     "slept": lambda talk: talk.reception.slept(3_600_000 * MS, talk.now_ns),
     "may have slept": lambda talk: talk.reception.doubt_clock("stopped", talk.now_ns),
-    "was not heard": lambda talk: talk.reception.handle([ClockVoid()], talk.now_ns),
+    "was not heard": lambda talk: talk.reception.receive(
+        NAMES[Lane.CONTROL], Knock(Lane.CONTROL, "first"), talk.now_ns
+    ),
 }
 
 
