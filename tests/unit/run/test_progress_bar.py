@@ -1,11 +1,12 @@
 """Long work says on a terminal what is being done and how long it still takes, and nothing elsewhere."""
 
 import io
+import time
 
 import pytest
 from rich.console import Console
 
-from phone_host.run.progress_bar import busy_bar, share_bar
+from phone_host.run.progress_bar import announced, busy_bar, share_bar
 
 
 def console(*, terminal: bool) -> tuple[Console, io.StringIO]:
@@ -44,6 +45,21 @@ def test_nothing_is_drawn_where_nobody_looks() -> None:
     drawn, shown = console(terminal=False)
     with share_bar("measuring", console=drawn) as advance, busy_bar("asking", drawn):
         advance(0.5)
+    assert shown.getvalue() == ""
+
+
+def test_a_stage_is_announced_again_and_again_where_its_bar_is_hidden() -> None:
+    """A log holds a line when it begins, and from time to time how far it is; on a terminal the bar says it."""
+    drawn, shown = console(terminal=False)
+    with announced("rendering", drawn, lambda: "40 %", 0.001):
+        while shown.getvalue().count("\n") < 3:
+            time.sleep(0.001)
+    lines = shown.getvalue().splitlines()
+    assert lines[0] == "phone-host: rendering"
+    assert set(lines[1:]) == {"phone-host: rendering: 40 %"}
+    drawn, shown = console(terminal=True)
+    with announced("rendering", drawn, lambda: "40 %", 0.0):
+        pass
     assert shown.getvalue() == ""
 
 
