@@ -17,6 +17,7 @@ MODES = [
     ({"mat": "usual", "unseen": "cut"}, "mat", "--mat --unseen cut"),
 ]
 CAMERAS = {"link": "tcp://192.168.7.2:5555", "camera": "v4l2:/dev/video0"}
+CALIBRATED = {**CAMERAS, "calibration": "rig.yaml"}
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -25,7 +26,7 @@ def test_every_viewer_shows_the_options_and_the_command_of_the_running_scan(
 ) -> None:
     """A viewer that did not start the scan shows its kind, detail, mat and box, cannot change what is fixed, and the card shows `scan` with these options."""
     options, kind, words = mode
-    program.patches, program.activity, program.settings = Patches(1), Activity.SCANNING, CAMERAS
+    program.patches, program.activity, program.settings = Patches(1), Activity.SCANNING, CALIBRATED
     order = ("voxel", "box", "mat", "turntable", "object", "unseen")
     program.scan = ScanState(words="go on", level="good", options={name: options.get(name, "") for name in order})
     page = opened("scan")
@@ -36,18 +37,22 @@ def test_every_viewer_shows_the_options_and_the_command_of_the_running_scan(
     assert page.is_disabled("#scan-unseen")
     assert page.input_value("#scan-unseen") == options.get("unseen", "fill")
     assert page.input_value("#scan-box") == options.get("box", "")
-    assert page.is_visible("#scan-mat") is (kind == "mat")
+    assert page.is_visible("#scan-mat") is ("8x6" in options.get("mat", ""))  # the default one needs no field any more
     page.wait_for_function("words => document.getElementById('command').textContent.endsWith(' ' + words)", arg=words)
-    assert page.text_content("#command").startswith("phone-host scan --camera")
+    assert page.text_content("#command").startswith("phone-host scan --calibration rig.yaml --camera")
     assert complaints == []
 
 
 def test_the_command_follows_step_and_choices(program: Played, opened: Opener) -> None:
-    """On the scan's step it is `scan` with what is chosen there, on others `run`; a value that a shell would read is quoted; before the cameras are chosen a sentence stands there."""
+    """On the scan's step it is `scan` with what is chosen there, on others `run`; a value that a shell would read is quoted; before cameras and calibration are chosen a sentence stands there."""
     program.patches = Patches(1)
     page = opened("scan")
-    page.wait_for_function("() => document.getElementById('command').textContent.startsWith('Command: appears once')")
+    said = "words => document.getElementById('command').textContent === `Command: appears once ${words}`"
+    page.wait_for_function(said, arg="board and camera are chosen")
     program.change(settings=CAMERAS)
+    page.wait_for_function(said, arg="the cameras are calibrated")
+    assert page.get_attribute("#command-copy", "aria-disabled") == "true"
+    program.change(settings=CALIBRATED)
     page.wait_for_function("() => document.getElementById('command').textContent.startsWith('phone-host scan')")
     page.select_option("#scan-kind", "object")
     page.fill("#scan-voxel", "2 mm; ls")
@@ -67,11 +72,16 @@ def test_a_box_that_another_viewer_sets_is_shown(program: Played, opened: Opener
 
 
 def test_a_phone_shows_the_surface_without_scrolling(program: Played, opened: Opener) -> None:
-    """At 390 px most of the surface's picture stands above the fold, its choices of colours and shape are whole, and each kind's words fit their field."""
+    """At 390 px most of the surface's picture stands above the fold of a scan on the mat whose depth was judged; its choices of colours and shape are whole, and each kind's words fit their field."""
     program.patches, program.activity = Patches(1), Activity.SCANNING
-    program.scan = ScanState(words="3 pairs in the model: go on", level="good", pairs=3, fused=3)
+    program.scan = ScanState(
+        words="3 pairs in the model: go on", level="good", pairs=3, fused=3, options={"mat": "usual"}
+    )
+    program.emit()
     page = opened("scan", PHONE)
     page.wait_for_selector("#scan-kind:disabled")
+    page.wait_for_selector("#trust[data-level=good]")
+    assert page.inner_text("#scan-state") == "3 pairs in the model: go on."
     frame = page.locator("#panel-scan .turning").bounding_box()
     assert frame["y"] + 0.75 * frame["height"] <= PHONE["height"]
     box = page.locator("#panel-scan .segments").bounding_box()

@@ -3,6 +3,7 @@
 import { byId, onPress, text } from './dom.js';
 
 const NOT_CHOSEN = 'Command: appears once board and camera are chosen';
+const NOT_CALIBRATED = 'Command: appears once the cameras are calibrated';
 const ONLY_HERE = 'Command: none, because only the page can scan with a browser\u2019s camera';
 
 /** Quote a word for a shell. @param {string} word */
@@ -20,8 +21,9 @@ export function optionWords(options) {
 /** @param {any} state @param {string} step - that is shown @param {Record<string, string>} options - of `scan`, as they are chosen */
 export function showCommand(state, step, options) {
   const isScan = step === 'scan';
-  const line = isScan && state.scan_command ? state.scan_command + optionWords(options) : isScan ? '' : state.command;
-  text(byId('command'), line || (state.command ? ONLY_HERE : NOT_CHOSEN));
+  const isMetric = !isScan || ['calibration', 'rectified'].some((name) => state.settings[name]);
+  const line = !isScan ? state.command : isMetric && state.scan_command ? state.scan_command + optionWords(options) : '';
+  text(byId('command'), line || (!state.command ? NOT_CHOSEN : isMetric ? ONLY_HERE : NOT_CALIBRATED));
   byId('command-copy').setAttribute('aria-disabled', String(!line));
 }
 

@@ -71,6 +71,7 @@ export class ScanPanel {
   follow(options) {
     const isOn = this.isScanning();
     for (const id of ['scan-kind', 'scan-mat', 'scan-voxel', 'scan-unseen']) if (field(id).disabled !== isOn) field(id).disabled = isOn;
+    this.kind();
     const told = JSON.stringify(options);
     if (told === this.followed) return;
     this.followed = told;
@@ -85,9 +86,9 @@ export class ScanPanel {
     this.outline(this.boxOf(box));
   }
 
-  /** Only a mat has a sheet to be named. */
+  /** Only a mat has a sheet to be named; while a scan goes on, the default one is not worth its place. */
   kind() {
-    show(byId('scan-sheet'), /** @type {HTMLSelectElement} */ (byId('scan-kind')).value === 'mat');
+    show(byId('scan-sheet'), field('scan-kind').value === 'mat' && !(this.isScanning() && !field('scan-mat').value));
   }
 
   /** Begin with a box around most of the surface, or keep everything again. */
@@ -132,7 +133,7 @@ export class ScanPanel {
     this.wasEnding = isEnding;
     data(byId('scan-state'), 'level', scan.level);
     text(byId('scan-words'), sentence(isOn || scan.folder ? scan.words : (step?.words ?? '')));
-    text(byId('scan-pairs'), scan.pairs && !scan.folder ? `${scan.fused} of ${scan.pairs} ${scan.pairs === 1 ? 'pair' : 'pairs'} are in the model` : '');
+    text(byId('scan-pairs'), scan.pairs > scan.fused && !scan.folder ? `${scan.fused} of ${scan.pairs} ${scan.pairs === 1 ? 'pair' : 'pairs'} are in the model` : '');
     text(byId('scan-folder'), scan.folder ? `Saved in ${scan.folder}` : '');
     keep(byId('scan-files'), scan.files, (name) => name, (name) => make('li', '', link(name)), () => undefined);
     show(byId('scan-saved'), scan.files.length > 0);
