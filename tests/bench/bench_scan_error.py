@@ -1,4 +1,4 @@
-"""Whether the stated error of a scan holds: `python -m tests.bench.bench_scan_error [--json] [--views N] [--seeds N] [--objects bunny,bottle] [--kinds mat,table,free,turntable] [--rig usual|wide] [--given street,room]`.
+"""Whether the stated error of a scan holds: `python -m tests.bench.bench_scan_error [--json] [--views N] [--seeds N] [--objects bunny,bottle] [--kinds mat,table,free,turntable] [--rig usual|wide] [--given street,room,rest]`.
 
 Rendered things of `tests.bench.scan_error_objects` at 640x480 px (two unlike cameras, 60 mm apart, blur, noise, JPEG), matched by `tandem`, from N places
 all around. stated: median standard deviation; rms: of the true errors where the surface was seen; inside: share of the points within two stated

@@ -92,13 +92,19 @@ def matched(left: Image, right: Image, geometry: StereoGeometry) -> View:
     )
 
 
-def at_rest(data: Path) -> Clip:
-    """euroc_v101_static: 12 pairs of a rig that does not move."""
+def rest_pairs(data: Path) -> tuple[list[RectifiedPair], StereoGeometry]:
+    """The rectified images of euroc_v101_static, and their geometry."""
     folder = data / "euroc_v101_static"
     rectifier = Rectifier(import_rig((folder,)).rig)
-    names = [sorted((folder / "mav0" / name / "data").iterdir()) for name in ("cam0", "cam1")]
-    pairs = [rectifier.rectify(_grey(left), _grey(right)) for left, right in zip(*names, strict=True)]
-    views = tuple(matched(pair.left, pair.right, rectifier.geometry) for pair in pairs)
+    files = (sorted((folder / "mav0" / name / "data").iterdir()) for name in ("cam0", "cam1"))
+    pairs = [rectifier.rectify(_grey(left), _grey(right)) for left, right in zip(*files, strict=True)]
+    return pairs, rectifier.geometry
+
+
+def at_rest(data: Path) -> Clip:
+    """euroc_v101_static: 12 pairs of a rig that does not move."""
+    pairs, geometry = rest_pairs(data)
+    views = tuple(matched(pair.left, pair.right, geometry) for pair in pairs)
     return Clip(views, tuple(SE3.identity() for _ in views))
 
 

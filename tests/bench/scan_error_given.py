@@ -1,7 +1,8 @@
 """Free scans of given sequences, compared with the surface that the given poses make of the same depths: what drift alone does to the stated error.
 
-street: 24 pairs of KITTI, matched by `tandem`. room: a depth camera's 120 views of 7-Scenes, given as the disparities of a rig with as much noise. The
-room's poses come from another depth tracker and are no better than some 15 mm. Errors that all depths share do not show, so the width says nothing.
+street: 24 pairs of KITTI, matched by `tandem`. rest: 12 pairs of EuRoC, from one place, matched in the same way. room: a depth camera's 120 views of
+7-Scenes, given as the disparities of a rig with as much noise. The room's poses come from another depth tracker and are no better than some 15 mm. Errors
+that all depths share do not show, so the width says nothing.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from common import now
-from phone_host.model import Disparity, Processed, RectifiedPair
+from phone_host.model import Disparity, Image, Processed, RectifiedPair
 from phone_host.scan.scan import Scan, scan_for
 from phone_host.scan.scan_model import ScanModel
 from phone_host.scan.scan_wanted import ScanWanted
@@ -20,17 +21,17 @@ from phone_host.scan.view import view_of
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.matcher_names import MatcherName
-from tests.bench.scan_clips import Clip, room, street, street_pairs
+from tests.bench.scan_clips import Clip, at_rest, rest_pairs, room, street, street_pairs
 from tests.bench.surface_errors import Surface, mesh_at, registered
 from tests.support.surface_coverage import Coverage, coverage
 
-GIVEN: Final = ("street", "room")
+GIVEN: Final = ("street", "room", "rest")
 
 _FOCAL_BASELINE: Final = 200.0
 """px m of a rig whose depths have 2.5 mm of noise at 1 m with 0.5 px in a disparity, as the depth camera's have."""
 
 _NEAR_M: Final = 0.4
-_STEP_S: Final = {"street": 0.1, "room": 1 / 30}
+_STEP_S: Final = {"street": 0.1, "room": 1 / 30, "rest": 0.05}
 
 
 class _Given:
@@ -47,8 +48,17 @@ class _Given:
 
 def _of_street(data: Path) -> tuple[Clip, list[Processed]]:
     clip = street(data).left
+    return clip, _matched(street_pairs(data), clip)
+
+
+def _of_rest(data: Path) -> tuple[Clip, list[Processed]]:
+    clip = at_rest(data)
+    return clip, _matched([(pair.left, pair.right) for pair in rest_pairs(data)[0]], clip)
+
+
+def _matched(pairs: Sequence[tuple[Image, Image]], clip: Clip) -> list[Processed]:
     core = StereoCore(MatchSettings(matcher=MatcherName.TANDEM, disparities=96), None, clip.views[0].geometry)
-    return clip, [core.compute(left, right, now.monotonic_ns) for left, right in street_pairs(data)]
+    return [core.compute(left, right, now.monotonic_ns) for left, right in pairs]
 
 
 def _of_room(data: Path) -> tuple[Clip, list[Processed]]:
@@ -72,7 +82,7 @@ def scan_sequence(name: str, data: Path) -> tuple[Scan, ScanModel, Coverage]:
     Returns:
         The scan, its model, and how its stated errors compare with those that the poses made.
     """
-    clip, pairs = _of_street(data) if name == "street" else _of_room(data)
+    clip, pairs = {"street": _of_street, "room": _of_room, "rest": _of_rest}[name](data)
     scan = scan_for(ScanWanted())
     for number, pair in enumerate(pairs):
         scan.take(str(number), number * _STEP_S[name], pair)
