@@ -4,7 +4,6 @@ It fits its terminal: on a phone's, the words wrap and the bar makes room, so th
 """
 
 import sys
-from collections.abc import Iterator
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,6 +25,7 @@ from rich.progress import (
 from rich.table import Column
 
 from common.program.terminal import say
+
 _AGAIN_S: Final = 8.0
 """Who reads a log learns so often that a stage still goes on."""
 
@@ -81,14 +81,14 @@ def announced(
         return
     over = threading.Event()
 
-    def say(words: str) -> None:
+    def line(words: str) -> None:
         print(f"phone-host: {words}", file=console.file, flush=True)
 
     def say_again() -> None:
         while not over.wait(again_s):
-            say(f"{stage}: {done()}")
+            line(f"{stage}: {done()}")
 
-    say(stage)
+    line(stage)
     thread = threading.Thread(target=say_again, name="stage", daemon=True)
     thread.start()
     try:
