@@ -6,13 +6,88 @@ import importlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
-from board_agent import examples
 from common.camera.options import EXAMPLE
 from common.program.commandline import ExamplesFirstParser, add_manual_options, add_version_option, run_command
 from common.program.interrupts import interruptible
 from common.program.invocation import as_found
 from common.program.quantities import file_size, frames_per_second, reading, seconds
+
+NEXT_STEPS: Final = """board-agent streams this machine's camera to a phone or laptop, each frame with the moment of its exposure.
+
+see which cameras are here, and what keeps them from streaming:
+  board-agent cameras
+  board-agent doctor
+
+try it without a camera, with a folder of pictures; a host on this machine can then connect to tcp://127.0.0.1:5555:
+  board-agent run --camera 'replay:frames?fps=30&loop=1'
+
+stream a webcam to other machines:
+  board-agent run --camera v4l2:auto --link 'tcp://*:5555'
+
+let a new host in, while it runs (type the code on the host):
+  sudo board-agent pair
+
+every verb and its options:
+  board-agent --help
+  board-agent run --help
+"""
+
+GENERAL: Final = """examples:
+  board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
+  board-agent run --config /etc/tandemscan/board-agent.toml
+  board-agent record --camera v4l2:auto --out walk.mcap
+  board-agent cameras
+  board-agent doctor
+  sudo board-agent pair
+  sudo board-agent keys --forget phone
+"""
+
+RUN: Final = """examples:
+  board-agent run --camera 'v4l2:/dev/video0?size=640x480&fps=30' --link 'tcp://*:5555'
+  board-agent run --camera 'replay:frames?fps=30&loop=1'
+  board-agent run --camera 'replay:frames?pace=demand' --link ipc://$XDG_RUNTIME_DIR/board
+  board-agent run --camera 'v4l2:auto?fps=30' --link 'rfcomm://*' --adapt quality,rate --least-fps 5
+  board-agent run --config /etc/tandemscan/board-agent.toml
+"""
+
+RECORD: Final = """examples:
+  board-agent record --camera v4l2:auto --out walk.mcap    # until Ctrl-C, or until nine tenths of the disk are full
+  board-agent record --camera v4l2:auto --out drive.mcap --ring 2GB    # the newest 2 GB: drive-000001.mcap and so on
+  board-agent record --camera 'replay:frames?fps=30' --seconds 60 --out minute.mcap
+  board-agent record --config /etc/tandemscan/board-agent.toml --out walk.mcap --most 500MB
+"""
+
+SETTINGS: Final = """examples:
+  board-agent settings
+  board-agent settings --config /etc/tandemscan/board-agent.toml
+  BOARD_AGENT_CAMERA=v4l2:auto board-agent settings --json
+"""
+
+CAMERAS: Final = """examples:
+  board-agent cameras
+  board-agent cameras --json
+"""
+
+DOCTOR: Final = """examples:
+  board-agent doctor    # what the service would use, where it is installed
+  board-agent doctor --camera v4l2:auto --link 'tcp://*:5555'
+  board-agent doctor --config /etc/tandemscan/board-agent.toml --json
+"""
+
+KEYS: Final = """examples:
+  sudo board-agent keys    # the service's keys, where it is installed
+  board-agent keys    # your own
+  sudo board-agent keys --forget phone
+  sudo board-agent keys --new    # then pair with every host again
+  sudo board-agent keys --add phone 'PUBLIC-KEY'    # as `phone-host keys` shows it
+"""
+
+PAIR: Final = """examples:
+  sudo board-agent pair    # for the service
+  board-agent pair --seconds 60    # for an agent that you started yourself
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -30,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     """Import the verb and run it. Only here are modules imported by a verb's name."""
     if options.verb is None:
-        print(as_found(examples.NEXT_STEPS), end="")
+        print(as_found(NEXT_STEPS), end="")
         return 0
     gc.disable()  # imported objects stay: looking for garbage among them only costs a board time
     try:
@@ -45,29 +120,29 @@ def _run(options: argparse.Namespace) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """All verbs with their options."""
-    made = ExamplesFirstParser("board-agent", description=examples.GENERAL)
+    made = ExamplesFirstParser("board-agent", description=GENERAL)
     add_version_option(made)
     add_manual_options(made)
     verbs = made.add_subparsers(dest="verb", metavar="VERB")
-    run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=examples.RUN)
+    run = verbs.add_parser("run", help="stream the camera's frames to a host until stopped", description=RUN)
     record = verbs.add_parser(
-        "record", help="keep the camera's frames on this board's disk, without a host", description=examples.RECORD
+        "record", help="keep the camera's frames on this board's disk, without a host", description=RECORD
     )
     show = verbs.add_parser(
-        "settings", help="print each setting, its value and where the value comes from", description=examples.SETTINGS
+        "settings", help="print each setting, its value and where the value comes from", description=SETTINGS
     )
     cameras = verbs.add_parser(
-        "cameras", help="list the cameras with their formats, rates and controls", description=examples.CAMERAS
+        "cameras", help="list the cameras with their formats, rates and controls", description=CAMERAS
     )
     doctor = verbs.add_parser(
-        "doctor", help="check camera, links, clocks, disk and power, and say what to mend", description=examples.DOCTOR
+        "doctor", help="check camera, links, clocks, disk and power, and say what to mend", description=DOCTOR
     )
     keys = verbs.add_parser(
         "keys",
         help="list the hosts that this board lets in, or change the list or the board's key",
-        description=examples.KEYS,
+        description=KEYS,
     )
-    pair = verbs.add_parser("pair", help="show a code that lets a new host in", description=examples.PAIR)
+    pair = verbs.add_parser("pair", help="show a code that lets a new host in", description=PAIR)
     _add_keys_options(keys, pair)
     _add_record_options(record)
     for verb in (run, record, show, cameras, doctor, keys, pair):

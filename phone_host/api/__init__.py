@@ -16,23 +16,26 @@ program and skips no result.
 This door stays backward compatible. The modules below it may change.
 """
 
+from pathlib import Path
+
 from common.frame import PixelFormat
 from common.recording.opened import open_recorded
 from phone_host.accounts.delays import DELAYS
 from phone_host.api.opening import open_scanner
 from phone_host.api.scanner import Scanner
-from phone_host.api.scans import save_scan, write_model
 from phone_host.diagnostics.run_snapshot import RunSnapshot
 from phone_host.geometry.se3 import SE3
 from phone_host.geometry.triangulate import Intersections, triangulate
 from phone_host.model import Disparity, Image, RectifiedPair, Result, StereoGeometry, UnseenSurface
+from phone_host.output.axes import Axes
 from phone_host.output.meshes.printable import Printer, Problem
-from phone_host.output.ply import write_ply
+from phone_host.output.ply import PointCloud, write_ply, write_surface
 from phone_host.output.rig_files.imported import Imported, import_rig
 from phone_host.printers.bed import Bed
 from phone_host.printers.door import Ended, Phase, Progress, Wishes
 from phone_host.run.model_job import check_model, export_model, print_model
-from phone_host.run.scan_job import read_field
+from phone_host.run.scan_job import finished_scan, read_field, write_scan
+from phone_host.run.scan_result import own_axes, require_something
 from phone_host.scan.blocks import Box
 from phone_host.scan.field_bytes import KeptField
 from phone_host.scan.mat import Mat, parse_mat
@@ -86,3 +89,37 @@ __all__ = [
     "write_model",
     "write_ply",
 ]
+
+
+def save_scan(folder: str | Path, scan: Scan, *, matcher: str = "unknown") -> None:
+    """Write model.ply, trajectory.txt, report.json and index.html as `phone-host scan` does; of a turn also field.bin, for another pass.
+
+    Args:
+        folder: created if missing; the files of an earlier scan in it are replaced.
+        scan: with all its pairs.
+        matcher: the name of what matched them, for the report.
+
+    Raises:
+        DataError: no pair has depth, or none shows what was asked for: the mat, a table with an object, something that turns.
+        UnavailableError: a file in the folder was not written by this program.
+        OSError: it cannot be written.
+    """
+    finished = finished_scan(scan, matcher=matcher, axes=own_axes(scan.wanted) or Axes.CAMERA)
+    require_something(finished.report)
+    write_scan(Path(folder), finished)
+
+
+def write_model(path: str | Path, model: ScanModel, unseen: UnseenSurface = UnseenSurface.FILL) -> None:
+    """Write the surface of a scan as PLY: metres, in the axes of the rectified left camera at the first pair that has depth, or of the mat or table.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        model: from `Scan.model()`.
+        unseen: what becomes of the part of a closed surface that no view measured.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    written = model.with_unseen(unseen)
+    mesh, seen = written.mesh, written.seen if written.is_closed else None
+    write_surface(Path(path), PointCloud(mesh.points_m, mesh.colours), mesh.triangles, seen=seen)

@@ -37,20 +37,23 @@ from common.stamp import HOST_CLOCK
 from phone_host.camera.browser_feed import BrowserFeed
 from phone_host.camera.factory import open_camera
 from phone_host.camera.uris import is_browser, is_http
-from phone_host.doctor.android_checks import Phone, check_camera, check_phone, check_usb
-from phone_host.doctor.android_checks import check_bluetooth as check_android_bluetooth
 from phone_host.doctor.host_checks import (
     OPENCV_WHEELS,
     Answer,
     BoardReadings,
     Package,
+    Phone,
     check_board,
+    check_camera,
     check_native,
     check_out,
     check_package,
+    check_phone,
     check_ports,
     check_python,
+    check_usb,
 )
+from phone_host.doctor.host_checks import check_bluetooth as check_android_bluetooth
 from phone_host.native.library import VARIABLE, native
 
 _CONNECT_S: Final = 2.0

@@ -4,18 +4,23 @@ docs/files.md describes them.
 """
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from phone_host.model import Processed
+import numpy as np
+from numpy.typing import NDArray
+
+from phone_host.model import CloudImage, Disparity, Processed
+from phone_host.output.atomic import write_parts
 from phone_host.output.axes import Axes
 from phone_host.output.depth_png import write_depth
-from phone_host.output.pfm import write_pfm, write_xyz
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import depth_picture, disparity_picture, write_png
+from phone_host.output.strips import strips
 
 
 class PairFile(Enum):
@@ -154,3 +159,52 @@ def _write(path: Path, file: PairFile, processed: Processed, axes: Axes) -> int:
         case _:
             write_png(path, depth_picture(cloud))
     return 0
+
+
+def write_pfm(path: Path, disparity: Disparity) -> None:
+    """Write a disparity map.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        disparity: (H, W) float32, px, NaN = none (any value that is not finite is written as +inf).
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+
+    def row_strips() -> Iterator[memoryview]:
+        for rows in _bottom_first(disparity):
+            data = np.where(np.isfinite(rows), rows, np.float32(np.inf))
+            yield np.ascontiguousarray(data, dtype="<f4").data.cast("B")
+
+    height, width = disparity.shape
+    write_parts(path, chain([f"Pf\n{width} {height}\n-1\n".encode()], row_strips()))
+
+
+def write_xyz(path: Path, cloud: CloudImage, axes: Axes = Axes.CAMERA) -> None:
+    """Write a cloud image: X, Y and Z of each pixel as the three channels.
+
+    Args:
+        path: the file; it appears whole or not at all.
+        cloud: (H, W, 3) float32, m, in the left camera's axes, NaN = none.
+        axes: axes of the file's points.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    height, width, _ = cloud.shape
+    # Whole rows: numpy multiplies a last axis of length 3 at a tenth of this speed.
+    signs = np.tile(axes.signs, width)
+
+    def row_strips() -> Iterator[memoryview]:
+        for rows in _bottom_first(np.ascontiguousarray(cloud).reshape(height, 3 * width)):
+            yield np.multiply(rows, signs, dtype="<f4").data.cast("B")
+
+    write_parts(path, chain([f"PF\n{width} {height}\n-1\n".encode()], row_strips()))
+
+
+def _bottom_first(values: NDArray[np.float32]) -> Iterator[NDArray[np.float32]]:
+    """Yield the rows in the file's order, some at a time."""
+    upside_down = values[::-1]
+    for rows in strips(*values.shape):
+        yield np.ascontiguousarray(upside_down[rows])

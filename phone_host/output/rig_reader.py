@@ -1,7 +1,9 @@
 """Reads the keys of a rig.yaml one by one, and checks each; `rig_yaml` says what they mean."""
 
 import math
+import re
 from pathlib import Path
+from typing import Final
 
 import cv2
 import numpy as np
@@ -15,10 +17,46 @@ from common.words import counted
 from phone_host.model import CameraModel, TimeOffset, Verdict
 from phone_host.output.rig_agreement import KeptRectification
 from phone_host.output.rig_cameras import known_lens, read_camera, require_count, usual_lens
-from phone_host.output.rig_sigmas import read_covariance
 from phone_host.output.rig_views import KEY as VIEWS
-from phone_host.output.rig_views import RigViews, read_views
-from phone_host.output.yaml_depth import is_too_deep
+from phone_host.output.rig_views import RigViews, read_covariance, read_views
+
+MOST_LEVELS: Final = 64
+"""A rig.yaml has three levels. OpenCV's parser survives 20000 on a stack of 8 MB."""
+
+_BLOCK: Final = re.compile(r":|-(?![\d.])")
+"""Begins a value that may itself be a map or a list; a sign before a number does not."""
+
+
+def is_too_deep(text: str) -> bool:
+    """Return whether a YAML text may nest more than `MOST_LEVELS` levels deep: OpenCV's parser calls itself for each, and a deep file overflows its stack.
+
+    The depth is never less than the parser's, whatever the text is, and as a rule the same. So:
+    - an opening bracket always counts, even in quotes or in a key;
+    - a closing one counts only where it cannot be part of a text: on a line without quotes and comments, behind the last colon;
+    - what a line leaves open ends at the next line that begins in the first column, because there the parser allows no inner value.
+    """
+    brackets = 0
+    columns: list[int] = []  # of the maps and lists without brackets that are open
+    for line in re.split(r"[\r\n]", text):
+        words = line.lstrip(" ")
+        if not words or words.startswith("#"):
+            continue
+        column = len(line) - len(words)
+        if column == 0:
+            brackets = 0
+        while columns and columns[-1] >= column:
+            columns.pop()
+        columns.append(column)
+        if words != "---":
+            columns.extend(column + mark.end() for mark in _BLOCK.finditer(words))
+        brackets += words.count("[") + words.count("{")
+        if brackets + len(columns) > MOST_LEVELS:
+            return True
+        if not re.search(r"[\"'#]", words):
+            after = words.rpartition(":")[2]
+            brackets = max(0, brackets - after.count("]") - after.count("}"))
+    return False
+
 
 _LARGEST_IMAGE_PX = 100_000
 _ROTATION_TOLERANCE = 1e-6  # files hold 16 digits; a matrix typed with 6 digits has this error

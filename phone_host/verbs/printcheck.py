@@ -15,10 +15,9 @@ from phone_host.jobs.output_folders import require_alone, require_folder, writte
 from phone_host.jobs.units import length_mm
 from phone_host.output.atomic import write_bytes
 from phone_host.output.json_text import json_text
-from phone_host.output.meshes.decimated import NoLibraryError
+from phone_host.output.meshes.decimated import Fixed, NoLibraryError, NotClosedError, fixed
 from phone_host.output.meshes.formats import mesh_bytes
 from phone_host.output.meshes.printable import Flaw, Printer, Problem, problems
-from phone_host.output.meshes.printable_fix import Fixed, NotClosedError, fixed
 from phone_host.output.meshes.printable_view import picture
 from phone_host.output.meshes.solid import Solid
 from phone_host.output.model_file import Model

@@ -9,8 +9,7 @@ import numpy as np
 
 from common.errors import DataError
 from phone_host.output.axes import Axes
-from phone_host.output.meshes.glb import glb_bytes
-from phone_host.output.meshes.glb_read import read_glb
+from phone_host.output.meshes.glb import glb_bytes, read_glb
 from phone_host.output.meshes.obj import obj_bytes, read_obj
 from phone_host.output.meshes.ply_mesh import ply_bytes, read_ply_mesh
 from phone_host.output.meshes.solid import Solid, weld_seams

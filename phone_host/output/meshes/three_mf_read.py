@@ -1,7 +1,9 @@
 """Reads 3MF: the meshes of all objects where the build puts them, in the unit that the file names. Pure.
 
 Source: 3MF Core Specification 1.3; colours by the Materials and Properties Extension 1.2.1, parts in files of their own (as Bambu Studio and OrcaSlicer
-write them) by the Production Extension 1.1.
+write them) by the Production Extension 1.1. What in a slicer's project is not the model (modifiers and marks for supports lie in it as meshes
+like any other): PrusaSlicer, src/libslic3r/Format/3mf.cpp (Slic3r_PE_model.config: ranges of triangles within an object); Bambu Studio and
+OrcaSlicer, bbs_3mf.cpp (model_settings.config: parts of an object).
 """
 
 import io
@@ -23,7 +25,6 @@ from phone_host.output.meshes.assembly import Part, assemble, require_count
 from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, require_corners
 from phone_host.output.meshes.text import require_short
 from phone_host.output.meshes.three_mf import axes_element
-from phone_host.output.meshes.three_mf_roles import Roles, read_roles
 
 _UNITS_M: Final = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}
 _TARGET: Final = re.compile(r'Target\s*=\s*"/?([^"]+\.model)"', re.IGNORECASE)
@@ -54,6 +55,19 @@ _NO_COLOUR: Final = -1
 
 Key = tuple[str, str]
 """The file of a package that an object or a group of colours is in, and its number there."""
+
+
+@dataclass(slots=True)
+class Roles:
+    """What has no part in the shape.
+
+    Attributes:
+        ranges: by number of an object: first and last triangle of each volume that is not the model.
+        parts: numbers of an object and of a component of it that is not the model.
+    """
+
+    ranges: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    parts: set[tuple[str, str]] = field(default_factory=set)
 
 
 @dataclass(slots=True)
@@ -271,3 +285,67 @@ def _part(palette: NDArray[np.uint8], thing: _Object, others: list[tuple[int, in
     if not (paints >= 0).any():
         return Part(points, triangles, NO_COLOURS, np.eye(4))
     return Part(points, triangles, colours_of_points(triangles.ravel(), palette[paints], len(points)), np.eye(4))
+
+
+_PRUSA, _BAMBU = "metadata/slic3r_pe_model.config", "metadata/model_settings.config"
+_MODEL: Final = frozenset({"modelpart", "normal_part"})
+_NEGATIVE: Final = frozenset({"negativevolume", "negative_part"})
+
+
+def read_roles(archive: zipfile.ZipFile, name: str) -> Roles:
+    """Read what the slicer says of the meshes; nothing where the file is of no slicer.
+
+    Raises:
+        DataError: a part is to be cut away, which is not done here.
+        ExpatError: what a slicer says is no XML.
+    """
+    roles = _RolesReader(name)
+    for each in archive.namelist():
+        if each.lower() in (_PRUSA, _BAMBU):
+            roles.read(archive.read(each))
+    return roles.found
+
+
+class _RolesReader:
+    def __init__(self, name: str) -> None:
+        self._name, self.found = name, Roles()
+        self._object, self._volume = "", (0, -1)
+
+    def read(self, content: bytes) -> None:
+        """Read one of the two files."""
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = self._start_element
+        parser.StartDoctypeDeclHandler = self._refuse
+        parser.Parse(content, True)  # noqa: FBT003 - expat's own argument
+
+    def _refuse(self, *_: object) -> None:
+        raise ValueError("a document type")
+
+    def _start_element(self, tag: str, attributes: dict[str, str]) -> None:
+        match tag:
+            case "object":
+                self._object = attributes.get("id", "")
+            case "part" if self._is_other(attributes.get("subtype", "normal_part")):
+                self.found.parts.add((self._object, attributes.get("id", "")))
+            case "volume":
+                self._volume = int(attributes["firstid"]), int(attributes["lastid"])
+            case "metadata" if self._is_role(attributes):
+                self.found.ranges.setdefault(self._object, []).append(self._volume)
+
+    def _is_role(self, attributes: dict[str, str]) -> bool:
+        """Return whether a line says that its volume is not the model."""
+        value = attributes.get("value", "")
+        match attributes.get("key"):
+            case "volume_type":
+                return self._is_other(value)
+            case "modifier":
+                return value == "1"
+        return False
+
+    def _is_other(self, role: str) -> bool:
+        if role.lower() in _NEGATIVE:
+            raise DataError(
+                f"{self._name} has a part that is to be cut away, which is not done here",
+                "let the slicer export the model as STL",
+            )
+        return role.lower() not in _MODEL

@@ -17,15 +17,13 @@ from common.places import Kind, kind_of
 from phone_host.model import Rectification, Rig
 from phone_host.output.calib_txt import is_calib_txt, read_calib_txt
 from phone_host.output.rig_files.colmap import CAMERAS, IMAGES, colmap_texts, is_cameras, is_images, read_colmap
-from phone_host.output.rig_files.euroc import euroc_texts, is_euroc, read_euroc
-from phone_host.output.rig_files.kalibr import is_kalibr, kalibr_texts, read_kalibr
+from phone_host.output.rig_files.kalibr import euroc_texts, is_euroc, is_kalibr, kalibr_texts, read_euroc, read_kalibr
 from phone_host.output.rig_files.opencv import is_opencv, merged, opencv_texts, read_opencv
 from phone_host.output.rig_files.rectified import kitti_texts, middlebury_texts, stated_of_geometry
 from phone_host.output.rig_files.ros import is_ros, read_ros, ros_texts
 from phone_host.output.rig_files.stated import StatedRig, baseline_of, rig_of
 from phone_host.output.rig_files.texts import RigText
-from phone_host.output.rig_files.tree import Node
-from phone_host.output.rig_files.xml_text import read_xml
+from phone_host.output.rig_files.tree import Node, read_xml
 from phone_host.output.rig_files.yaml_text import read_yaml
 from phone_host.output.rig_yaml import read_rig
 

@@ -12,7 +12,7 @@ from common.recording.layout import ABOUT, CLOCK, DELAYS, About, camera_name, ca
 from common.recording.recording_file import written
 from common.recording.ros_messages import COMPRESSED_IMAGE, RecordedImage, image_message
 from phone_host.bench.cli import main
-from phone_host.bench.recorded import recorded_run
+from phone_host.bench.command import recorded_run
 from phone_host.sync.fifo import FifoSettings, Overflow
 from tests.support.bench_results import ledger, result
 from tests.support.recorded import payload

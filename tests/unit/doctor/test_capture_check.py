@@ -11,9 +11,8 @@ import pytest
 from common.camera_identity import CameraIdentity
 from common.diagnostic import Severity
 from common.errors import DataError
-from phone_host.doctor.camera_check.check import ENOUGH, CaptureCheck, Plan, Stage, rigidity_of
+from phone_host.doctor.camera_check.check import ENOUGH, CaptureCheck, Plan, Shot, Stage, pace_of, rigidity_of
 from phone_host.doctor.camera_check.look import FRAMES, Reading, Window, guessed_lens, look
-from phone_host.doctor.camera_check.pace import Shot, pace_of
 from phone_host.doctor.camera_check.words import (
     CHECK_AGAIN,
     findings_of,

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from phone_host.doctor.camera_check.bundle import Floats, Tracks
-from phone_host.doctor.camera_check.consensus import still_points
 from phone_host.doctor.camera_check.look import RIGID, WARPED, excess_of
-from phone_host.doctor.camera_check.rigid import Compared, compare
+from phone_host.doctor.camera_check.rigid import Compared, compare, still_points
 from phone_host.geometry.lens import project, rays_through
 from phone_host.geometry.se3 import rotations_of
 from phone_host.model import CameraModel

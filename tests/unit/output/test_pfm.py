@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from phone_host.model import Disparity
 from phone_host.output.axes import Axes
-from phone_host.output.pfm import write_pfm, write_xyz
+from phone_host.output.pair_files import write_pfm, write_xyz
 from tests.support.point_files import read_pfm, read_xyz
 
 

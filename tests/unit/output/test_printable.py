@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from phone_host.output.meshes.decimated import NotClosedError, fixed
 from phone_host.output.meshes.nearby import Grid, hits
 from phone_host.output.meshes.printable import Flaw, Printer, Problem, bodies, fit_of, problems, volume_mm3
-from phone_host.output.meshes.printable_fix import NotClosedError, fixed
 from phone_host.output.meshes.printable_view import picture
 
 _USUAL: Final = Printer()

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from common.errors import DataError
+from phone_host.output.rig_reader import MOST_LEVELS, is_too_deep
 from phone_host.output.rig_yaml import read_rig, write_rig
-from phone_host.output.yaml_depth import MOST_LEVELS, is_too_deep
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.rigs import unlike_rig
 

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import DataError
-from phone_host.output.rig_files.tree import Tree
-from phone_host.output.rig_files.xml_text import read_xml
+from phone_host.output.rig_files.tree import Tree, read_xml
 from phone_host.output.rig_files.yaml_text import read_yaml
 
 

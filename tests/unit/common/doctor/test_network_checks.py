@@ -10,7 +10,7 @@ from common.doctor.network_checks import ACCESS_POINT, CABLE_BOARD, Card, check_
 from common.doctor.network_probe import examine_network
 from common.groups import group_name, group_of_one
 from common.link.uri import parse_link
-from phone_host.doctor.android_checks import Phone, check_bluetooth, check_camera, check_phone, check_usb
+from phone_host.doctor.host_checks import Phone, check_bluetooth, check_camera, check_phone, check_usb
 
 OK, WARN, FAIL = Severity.OK, Severity.WARN, Severity.FAIL
 CABLE = Card("usb0", CABLE_BOARD, is_up=True)

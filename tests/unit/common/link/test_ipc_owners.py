@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import zmq
 
-from board_agent.doctor.link_probe import examine_link
+from board_agent.doctor.board_doctor import examine_link
 from common.diagnostic import Severity
 from common.doctor.access import Account
 from common.doctor.unit_check import Unit
