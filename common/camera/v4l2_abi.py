@@ -30,6 +30,11 @@ def fourcc_name(code: int) -> str:
     return "".join(chr(byte) if 32 < byte < 127 else "." for byte in (code & 0x7FFFFFFF).to_bytes(4, "little"))
 
 
+def _u32(names: str) -> list[tuple[str, type[c_uint32]]]:
+    """Fields of 32 bits, by their names with blanks between."""
+    return [(name, c_uint32) for name in names.split()]
+
+
 class Capability(ctypes.Structure):
     """struct v4l2_capability, 104 bytes."""
 
@@ -37,9 +42,7 @@ class Capability(ctypes.Structure):
         ("driver", c_char * 16),
         ("card", c_char * 32),
         ("bus_info", c_char * 32),
-        ("version", c_uint32),
-        ("capabilities", c_uint32),
-        ("device_caps", c_uint32),
+        *_u32("version capabilities device_caps"),
         ("reserved", c_uint32 * 3),
     ]
 
@@ -48,12 +51,9 @@ class FormatDescription(ctypes.Structure):
     """struct v4l2_fmtdesc, 64 bytes."""
 
     _fields_ = [
-        ("index", c_uint32),
-        ("type", c_uint32),
-        ("flags", c_uint32),
+        *_u32("index type flags"),
         ("description", c_char * 32),
-        ("pixelformat", c_uint32),
-        ("mbus_code", c_uint32),
+        *_u32("pixelformat mbus_code"),
         ("reserved", c_uint32 * 3),
     ]
 
@@ -62,18 +62,9 @@ class PixelLayout(ctypes.Structure):
     """struct v4l2_pix_format, 48 bytes."""
 
     _fields_ = [
-        ("width", c_uint32),
-        ("height", c_uint32),
-        ("pixelformat", c_uint32),
-        ("field", c_uint32),
-        ("bytesperline", c_uint32),
-        ("sizeimage", c_uint32),
-        ("colorspace", c_uint32),
-        ("priv", c_uint32),
-        ("flags", c_uint32),
-        ("encoding", c_uint32),
-        ("quantization", c_uint32),
-        ("xfer_func", c_uint32),
+        *_u32(
+            "width height pixelformat field bytesperline sizeimage colorspace priv flags encoding quantization xfer_func"
+        )
     ]
 
 
@@ -86,39 +77,22 @@ class Fraction(ctypes.Structure):
 class FrameSize(ctypes.Structure):
     """struct v4l2_frmsizeenum, 44 bytes. Discrete: the first two of `values`; stepwise: min, max, step of width, then of height."""
 
-    _fields_ = [
-        ("index", c_uint32),
-        ("pixel_format", c_uint32),
-        ("type", c_uint32),
-        ("values", c_uint32 * 6),
-        ("reserved", c_uint32 * 2),
-    ]
+    _fields_ = [*_u32("index pixel_format type"), ("values", c_uint32 * 6), ("reserved", c_uint32 * 2)]
 
 
 class FrameInterval(ctypes.Structure):
     """struct v4l2_frmivalenum, 52 bytes. Discrete: the first of `values`, in seconds; stepwise: min, max, step."""
 
-    _fields_ = [
-        ("index", c_uint32),
-        ("pixel_format", c_uint32),
-        ("width", c_uint32),
-        ("height", c_uint32),
-        ("type", c_uint32),
-        ("values", Fraction * 3),
-        ("reserved", c_uint32 * 2),
-    ]
+    _fields_ = [*_u32("index pixel_format width height type"), ("values", Fraction * 3), ("reserved", c_uint32 * 2)]
 
 
 class StreamParameters(ctypes.Structure):
     """struct v4l2_streamparm with v4l2_captureparm, 204 bytes."""
 
     _fields_ = [
-        ("type", c_uint32),
-        ("capability", c_uint32),
-        ("capturemode", c_uint32),
+        *_u32("type capability capturemode"),
         ("timeperframe", Fraction),
-        ("extendedmode", c_uint32),
-        ("readbuffers", c_uint32),
+        *_u32("extendedmode readbuffers"),
         ("raw_data", c_uint8 * 176),
     ]
 
@@ -126,13 +100,7 @@ class StreamParameters(ctypes.Structure):
 class BufferRequest(ctypes.Structure):
     """struct v4l2_requestbuffers, 20 bytes."""
 
-    _fields_ = [
-        ("count", c_uint32),
-        ("type", c_uint32),
-        ("memory", c_uint32),
-        ("capabilities", c_uint32),
-        ("flags_and_reserved", c_uint32),
-    ]
+    _fields_ = [*_u32("count type memory capabilities flags_and_reserved")]
 
 
 class ControlValue(ctypes.Structure):
@@ -145,17 +113,13 @@ class ControlQuery(ctypes.Structure):
     """struct v4l2_query_ext_ctrl, 232 bytes."""
 
     _fields_ = [
-        ("id", c_uint32),
-        ("type", c_uint32),
+        *_u32("id type"),
         ("name", c_char * 32),
         ("minimum", c_int64),
         ("maximum", c_int64),
         ("step", c_uint64),
         ("default_value", c_int64),
-        ("flags", c_uint32),
-        ("elem_size", c_uint32),
-        ("elems", c_uint32),
-        ("nr_of_dims", c_uint32),
+        *_u32("flags elem_size elems nr_of_dims"),
         ("dims", c_uint32 * 4),
         ("reserved", c_uint32 * 32),
     ]
@@ -210,8 +174,7 @@ def _event(time: type[c_int32] | type[c_int64]) -> type[ctypes.Structure]:
         _fields_ = [
             ("type", c_uint32),
             ("u", c_int64 * 8),
-            ("pending", c_uint32),
-            ("sequence", c_uint32),
+            *_u32("pending sequence"),
             ("seconds", time),
             ("nanoseconds", time),
             ("id", c_uint32),
@@ -241,19 +204,13 @@ def layout(pointer_bits: int, time_bits: int) -> Layout:
     class Buffer(ctypes.Structure):
         _anonymous_ = ("place",)
         _fields_ = [
-            ("index", c_uint32),
-            ("type", c_uint32),
-            ("bytesused", c_uint32),
-            ("flags", c_uint32),
-            ("field", c_uint32),
+            *_u32("index type bytesused flags field"),
             ("seconds", time),
             ("microseconds", time),
             ("timecode", c_uint32 * 4),
-            ("sequence", c_uint32),
-            ("memory", c_uint32),
+            *_u32("sequence memory"),
             ("place", Place),
-            ("length", c_uint32),
-            ("reserved2", c_uint32),
+            *_u32("length reserved2"),
             ("request_fd", c_int32),
         ]
 
@@ -302,19 +259,14 @@ CAP_STREAMING: Final = 0x04000000
 CAP_DEVICE_CAPS: Final = 0x80000000
 CAP_TIMEPERFRAME: Final = 0x1000
 
-FMT_FLAG_COMPRESSED: Final = 0x1
-FMT_FLAG_EMULATED: Final = 0x2
-
 FRMSIZE_TYPE_DISCRETE: Final = 1
 FRMIVAL_TYPE_DISCRETE: Final = 1
 
 BUF_FLAG_ERROR: Final = 0x00000040
 BUF_FLAG_TIMESTAMP_MASK: Final = 0x0000E000
-BUF_FLAG_TIMESTAMP_UNKNOWN: Final = 0x00000000
 BUF_FLAG_TIMESTAMP_MONOTONIC: Final = 0x00002000
 BUF_FLAG_TIMESTAMP_COPY: Final = 0x00004000
 BUF_FLAG_TSTAMP_SRC_MASK: Final = 0x00070000
-BUF_FLAG_TSTAMP_SRC_EOF: Final = 0x00000000
 BUF_FLAG_TSTAMP_SRC_SOE: Final = 0x00010000
 
 CTRL_FLAG_DISABLED: Final = 0x0001
@@ -328,7 +280,6 @@ CTRL_TYPE_INTEGER: Final = 1
 CTRL_TYPE_BOOLEAN: Final = 2
 CTRL_TYPE_MENU: Final = 3
 CTRL_TYPE_CTRL_CLASS: Final = 6
-CTRL_TYPE_INTEGER_MENU: Final = 9
 
 EVENT_CTRL: Final = 3
 EVENT_SUB_FL_ALLOW_FEEDBACK: Final = 2
