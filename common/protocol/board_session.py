@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from common.orientation import UPRIGHT
-from common.protocol.absence import Presence
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -33,7 +32,16 @@ from common.protocol.message import (
     Status,
     Steer,
 )
-from common.protocol.terms import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
+from common.protocol.terms import (
+    HELLO_RETRY_NS,
+    MS,
+    SILENCE_NS,
+    STATUS_NS,
+    STATUS_SLOW_NS,
+    TAKEOVER_NS,
+    Outgoing,
+    Presence,
+)
 
 _NEVER = 2**63 - 1
 
