@@ -243,6 +243,14 @@ def read_whole(path: Path, most_bytes: int) -> bytes:
     return content
 
 
+def read_given(path: Path, most_bytes: int, remedy: str) -> bytes:
+    """Do the same for a file that has to be there: what the system refuses is a DataError, too, with this remedy."""
+    try:
+        return read_whole(path, most_bytes)
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror or error})", remedy) from error
+
+
 def _up_to(file: BinaryIO, expected_bytes: int, most_bytes: int) -> bytes:
     """Read a file up to one byte beyond the limit. Memory is taken for what is there, not for what the limit allows."""
     content = file.read(expected_bytes + 1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from common.camera_identity import RememberedCamera
 from common.errors import DataError
-from common.files import read_whole
+from common.files import read_given
 from common.versions import RIG_FORMAT
 from common.words import counted
 from phone_host.model import CameraModel, TimeOffset, Verdict
@@ -98,11 +98,12 @@ class RigReader:
         self._path = path
         self.version = 1
         try:
-            text = (read_whole(path, _MOST_BYTES) if content is None else content).decode("utf-8")
-        except OSError as error:
-            raise DataError(
-                f"{path} cannot be read ({error.strerror})", "give the rig.yaml of `phone-host calibrate`"
-            ) from error
+            given = (
+                read_given(path, _MOST_BYTES, "give the rig.yaml of `phone-host calibrate`")
+                if content is None
+                else content
+            )
+            text = given.decode("utf-8")
         except UnicodeDecodeError as error:
             raise self._no_storage() from error
         # OpenCV would also accept JSON and XML, and abort on other text with a message of its own.

@@ -11,7 +11,7 @@ from typing import Final
 from common.camera.image_numbers import MOST_SPAN, numbers_of
 from common.camera.replay import find_images
 from common.errors import DataError
-from common.files import read_whole
+from common.files import read_given
 from common.words import counted
 from phone_host.recording.import_rules import Unit, at_rate, dated_unit, numbers_in, times_ns, usual_step
 
@@ -145,8 +145,5 @@ def _sorted(images: list[TimedImage]) -> list[TimedImage]:
 
 
 def _lines(path: Path) -> list[str]:
-    try:
-        text = read_whole(path, _MOST_TIMES_BYTES).decode("utf-8-sig", "replace")
-    except OSError as error:
-        raise DataError(f"{path} cannot be read ({error.strerror})", "check its name") from None
+    text = read_given(path, _MOST_TIMES_BYTES, "check its name").decode("utf-8-sig", "replace")
     return [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#")]
