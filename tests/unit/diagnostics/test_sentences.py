@@ -16,9 +16,15 @@ from common.versions import PROTOCOL_VERSION
 from phone_host.accounts.link_account import Away, LinkAccount, SessionAccount
 from phone_host.diagnostics.codes import REJECTED_RIG
 from phone_host.diagnostics.image_rules import image_doubts
-from phone_host.diagnostics.run_rules import arrival_concerns, gone_concerns, no_depth
+from phone_host.diagnostics.run_rules import (
+    Timing,
+    arrival_concerns,
+    gone_concerns,
+    no_depth,
+    stamp_doubt,
+    timing_concerns,
+)
 from phone_host.diagnostics.throughput import RunFigures, judge
-from phone_host.diagnostics.timing import Timing, stamp_doubt, timing_concerns
 from phone_host.model import Arrangement, CutCounts, DepthLimits, Evidence, Exposure, Support, TimeOffset
 from phone_host.stream.refusals import BoardRefusal, refusal_text
 from phone_host.sync.fifo import Overflow

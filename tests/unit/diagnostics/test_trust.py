@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from common.camera.base import CameraHealth, CameraState
 from phone_host.diagnostics.codes import Code
-from phone_host.diagnostics.timing import Timing, stamp_doubt, timing_concerns
+from phone_host.diagnostics.run_rules import Timing, stamp_doubt, timing_concerns
 from phone_host.model import UNMEASURED_NS, TimeOffset
 
 MS = 1_000_000

@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 
 from phone_host.model import Image, RectifiedPair
-from phone_host.stereo.match_sgbm import SgbmMatcher
-from phone_host.stereo.match_support import cost_of, sides, supported, without_doubtful_bridges
+from phone_host.stereo.match_sgbm import SgbmMatcher, cost_of, sides, supported, without_doubtful_bridges
 from tests.support.planes import noise
 
 TRUE_PX, PERIOD_PX = 10, 24
