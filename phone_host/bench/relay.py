@@ -25,7 +25,6 @@ from common import now
 from common.errors import UnavailableError
 from common.program.signals import StopSignals
 from phone_host.bench.emulate import SEGMENT_BYTES, Profile, Way
-from phone_host.report.bench_result import RelayAccount
 from phone_host.subprocesses.board_process import GOODBYE_S, child_process
 
 _SOCKET_BUFFER_BYTES: Final = 16 * 1024
