@@ -7,7 +7,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-from common.files import open_temporary, remove_left_behind, remove_temporary, sync_folder
+from common.files import sync_folder
+from common.temporary import open_temporary, remove_left_behind, remove_temporary
 from common.unfinished import unfinished
 
 _FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC

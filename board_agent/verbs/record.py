@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Final
 
 from board_agent.await_camera import wait_for_camera
-from board_agent.disk_writer import PARTS, SIDE, BoundedFiles, DiskWriter, parts_of
+from board_agent.disk_writer import SIDE, DiskWriter
 from board_agent.recording import BoardRecording, End, Outcome
+from board_agent.ring import PARTS, BoundedFiles, parts_of
 from board_agent.sd_notify import Notifier
 from board_agent.settings import LONGEST_S, check, resolve_settings
 from common import now

@@ -22,7 +22,7 @@ from common.doctor.camera_checks import UsbBus, UsbCamera
 from common.doctor.machine_checks import Bluetooth, Clocks, Disk, KernelLog, LogLine, Supply, throttled
 from common.doctor.network_checks import Card
 from common.doctor.unit_check import Unit
-from common.files import group_name
+from common.groups import group_name
 from common.places import nearest
 
 _VIDEO_CLASS: Final = "0e"

@@ -13,7 +13,7 @@ from typing import Final
 import serial
 
 from common.errors import MissingDeviceError, TakenError, UnavailableError
-from common.files import group_name
+from common.groups import group_name
 from common.link.stream import StreamLink
 from common.link.uri import LinkRequest
 from common.protocol.framing import LinkEnd

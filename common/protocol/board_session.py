@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import assert_never
 
 from common.orientation import UPRIGHT
+from common.protocol.absence import Presence
 from common.protocol.message import (
     BoardCounts,
     BoardHello,
@@ -32,16 +33,7 @@ from common.protocol.message import (
     Status,
     Steer,
 )
-from common.protocol.terms import (
-    HELLO_RETRY_NS,
-    MS,
-    SILENCE_NS,
-    STATUS_NS,
-    STATUS_SLOW_NS,
-    TAKEOVER_NS,
-    Outgoing,
-    Presence,
-)
+from common.protocol.terms import HELLO_RETRY_NS, MS, SILENCE_NS, STATUS_NS, STATUS_SLOW_NS, TAKEOVER_NS, Outgoing
 
 _NEVER = 2**63 - 1
 

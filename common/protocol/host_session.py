@@ -12,7 +12,9 @@ account only up to that credit. Time in which this process did not run counts as
 from collections.abc import Sequence
 from typing import Final, assert_never
 
-from common.protocol.host_path import Carriage, HostPath
+from common.protocol.absence import Presence
+from common.protocol.host_carriage import Carriage
+from common.protocol.host_path import HostPath
 from common.protocol.host_stream import Stream
 from common.protocol.message import (
     BoardCounts,
@@ -55,7 +57,6 @@ from common.protocol.session import (
     Unbelievable,
     Vanished,
 )
-from common.protocol.terms import Presence
 
 _FOREIGN_RETRY_NS: Final = 5000 * MS
 """Retry time for a link that leads to another board, or refuses us while another link is open: someone may move the cable."""

@@ -25,7 +25,7 @@ from common import now
 from common.errors import UnavailableError
 from common.program.signals import StopSignals
 from phone_host.bench.emulate import SEGMENT_BYTES, Profile, Way
-from phone_host.subprocesses.board_process import GOODBYE_S, child_process
+from phone_host.subprocesses.child_process import GOODBYE_S, child_process
 
 _SOCKET_BUFFER_BYTES: Final = 16 * 1024
 """Size of each socket's buffers. With the loopback's own segments of 64 KB, a buffer would hold a second of Bluetooth."""

@@ -8,7 +8,7 @@ import stat
 from pathlib import Path
 from typing import Final
 
-from common.files import final_name
+from common.temporary import final_name
 from phone_host.output.pair_files import PAIR_NAMES
 
 FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC

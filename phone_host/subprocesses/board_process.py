@@ -5,51 +5,16 @@ import os
 import socket
 import stat
 import subprocess
-import sys
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 from common.errors import UnavailableError
 from common.link.zeromq_address import owner_of
 from common.program.commandline import INTERRUPTED
-
-GOODBYE_S: Final = 10.0
-"""How long a child may take to end when asked. Our programs need at most 0.3 s on an idle machine."""
-
-
-@contextmanager
-def child_process(module: str, arguments: Sequence[str], *, errors: bool = False) -> Iterator[subprocess.Popen[bytes]]:
-    """Run `python -m MODULE` for the length of a block, with a pipe from its stdout.
-
-    Args:
-        module: one of our runnable modules.
-        arguments: its command line.
-        errors: whether its stderr is a pipe, too. Otherwise it goes where ours goes.
-    """
-    # -P: do not import a folder named `common` from the user's current folder.
-    process = subprocess.Popen(
-        [sys.executable, "-P", "-m", module, *arguments],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE if errors else None,
-    )
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.terminate()
-            try:
-                process.wait(GOODBYE_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
-        for pipe in (process.stdout, process.stderr):
-            if pipe is not None:
-                pipe.close()
+from phone_host.subprocesses.child_process import GOODBYE_S, child_process
 
 
 def runtime_folder(environment: Mapping[str, str]) -> Path:

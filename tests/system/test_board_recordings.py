@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from board_agent.disk_writer import part_path, parts_of
+from board_agent.ring import part_path, parts_of
 from common.recording.opened import open_recorded
 from tests.support.handheld import Eye, hand, panned
 from tests.support.programs import board, host, ledgers, on_a_full_disk, program, until

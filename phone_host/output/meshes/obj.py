@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from common.byte_order_mark import without_mark
 from common.errors import DataError
-from phone_host.output.meshes.solid import NO_COLOURS, Solid, polygon_triangles, require_short, sound_solid, text_lines
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, polygon_triangles, sound_solid
+from phone_host.output.meshes.text import require_short, text_lines
 
 _NUMBERS: Final = (3, 4, 6, 7)
 """Of a point: three, perhaps a weight that polygons do not heed, or a colour, perhaps with its opacity."""

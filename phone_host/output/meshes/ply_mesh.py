@@ -17,9 +17,9 @@ from phone_host.output.meshes.solid import (
     Solid,
     colours_of_points,
     polygon_triangles,
-    require_short,
     sound_solid,
 )
+from phone_host.output.meshes.text import require_short
 
 _CORNER_LISTS: Final = ("vertex_indices", "vertex_index")
 _SHADES: Final = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from common.byte_order_mark import without_mark
 from common.errors import DataError
 from common.words import counted
-from phone_host.output.meshes.solid import Solid, require_short, require_triangles, sound_solid, text_lines, welded
+from phone_host.output.meshes.solid import Solid, require_triangles, sound_solid, welded
+from phone_host.output.meshes.text import require_short, text_lines
 
 _TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER: Final = 80

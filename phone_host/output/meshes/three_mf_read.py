@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.output.axes import Axes
 from phone_host.output.meshes.assembly import Part, assemble, require_count
-from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, require_corners, require_short
+from phone_host.output.meshes.solid import NO_COLOURS, Solid, colours_of_points, require_corners
+from phone_host.output.meshes.text import require_short
 from phone_host.output.meshes.three_mf import axes_element
 
 _UNITS_M: Final = {"micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048, "meter": 1.0}

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from common.errors import DataError
 from phone_host.model import Lens, Rig
 from phone_host.output.rig_files.stated import StatedCamera, StatedRig, stated_of
-from phone_host.output.rig_files.tree import Node, RigText, number
+from phone_host.output.rig_files.texts import RigText, number
+from phone_host.output.rig_files.tree import Node
 from phone_host.output.trajectory_text import quaternion_of
 
 CAMERAS: Final = "cameras.txt"

@@ -22,7 +22,8 @@ from phone_host.output.rig_files.opencv import is_opencv, merged, opencv_texts, 
 from phone_host.output.rig_files.rectified import kitti_texts, middlebury_texts, stated_of_geometry
 from phone_host.output.rig_files.ros import is_ros, read_ros, ros_texts
 from phone_host.output.rig_files.stated import StatedRig, baseline_of, rig_of
-from phone_host.output.rig_files.tree import Node, RigText, read_xml
+from phone_host.output.rig_files.texts import RigText
+from phone_host.output.rig_files.tree import Node, read_xml
 from phone_host.output.rig_files.yaml_text import read_yaml
 from phone_host.output.rig_yaml import read_rig
 

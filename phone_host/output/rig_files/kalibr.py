@@ -11,18 +11,10 @@ Source: https://github.com/ethz-asl/kalibr/wiki/yaml-formats; M. Burri et al., "
 import numpy as np
 
 from phone_host.model import Rig
-from phone_host.output.rig_files.stated import (
-    EUROC_LENSES,
-    KALIBR_LENSES,
-    StatedCamera,
-    StatedRig,
-    lens_name,
-    lens_of,
-    padded_coefficients,
-    rigid_of,
-    stated_of,
-)
-from phone_host.output.rig_files.tree import Node, RigText, flow, matrix_map, rigid
+from phone_host.output.rig_files.lenses import EUROC_LENSES, KALIBR_LENSES, lens_name, lens_of, padded_coefficients
+from phone_host.output.rig_files.stated import StatedCamera, StatedRig, rigid_of, stated_of
+from phone_host.output.rig_files.texts import RigText, flow, matrix_map, rigid
+from phone_host.output.rig_files.tree import Node
 
 _POSE = "T_cn_cnm1"
 

@@ -14,7 +14,8 @@ from common.errors import DataError
 from common.words import counted
 from phone_host.model import Lens, Rectification, Rig
 from phone_host.output.rig_files.stated import StatedCamera, StatedRig, rotation_of, stated_of
-from phone_host.output.rig_files.tree import Node, RigText, Tree, number
+from phone_host.output.rig_files.texts import RigText, number
+from phone_host.output.rig_files.tree import Node, Tree
 
 _SIDES: Final = (("1", "left"), ("2", "right"))
 _MATRIX: Final = (

@@ -8,7 +8,7 @@ import numpy as np
 from common.errors import DataError
 from phone_host.model import Lens, Rectification, StereoGeometry
 from phone_host.output.rig_files.stated import StatedCamera, StatedRig
-from phone_host.output.rig_files.tree import RigText, number
+from phone_host.output.rig_files.texts import RigText, number
 
 _NAME = "calib.txt"
 

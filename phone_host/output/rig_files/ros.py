@@ -19,17 +19,10 @@ from numpy.typing import NDArray
 
 from common.errors import DataError
 from phone_host.model import Lens, Rectification, Rig
-from phone_host.output.rig_files.stated import (
-    ROS_LENSES,
-    StatedCamera,
-    StatedRig,
-    lens_name,
-    lens_of,
-    padded_coefficients,
-    rotation_of,
-    stated_of,
-)
-from phone_host.output.rig_files.tree import Node, RigText, flow, matrix_map
+from phone_host.output.rig_files.lenses import ROS_LENSES, lens_name, lens_of, padded_coefficients
+from phone_host.output.rig_files.stated import StatedCamera, StatedRig, rotation_of, stated_of
+from phone_host.output.rig_files.texts import RigText, flow, matrix_map
+from phone_host.output.rig_files.tree import Node
 
 _SAME: Final = 1e-3
 """By how many px the two projections may differ where rectified cameras are alike; files hold five digits."""

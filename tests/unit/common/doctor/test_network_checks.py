@@ -8,7 +8,7 @@ from common.diagnostic import Severity
 from common.doctor import machine
 from common.doctor.network_checks import ACCESS_POINT, CABLE_BOARD, Card, check_dialling, check_listening
 from common.doctor.network_probe import examine_network
-from common.files import group_name, group_of_one
+from common.groups import group_name, group_of_one
 from common.link.uri import parse_link
 from phone_host.doctor.host_checks import Phone, check_bluetooth, check_camera, check_phone, check_usb
 

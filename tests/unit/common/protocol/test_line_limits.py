@@ -5,7 +5,8 @@ import struct
 import pytest
 
 from common.protocol.chunking import Cutter, Joiner
-from common.protocol.duplex import GAP_NS, Change, Contact, Duplex, News
+from common.protocol.contact import Contact, News
+from common.protocol.duplex import GAP_NS, Change, Duplex
 from common.protocol.framing import MAX_BODY_BYTES, Deframer, LinkEnd, Unit, UnitKind, unit_parts
 from common.protocol.message import Lane
 from common.protocol.pacing import Window

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from common.ledger import BoardMarks
 from common.protocol.board_session import STEER_REST_NS, BoardSession
-from common.protocol.host_path import OLD_NS, SLOW_ECHO_NS, WAVE_ECHOES_EARLY, YOUNG_NS
 from common.protocol.message import (
     BoardCounts,
     Credit,
@@ -31,6 +30,7 @@ from common.protocol.session import (
     Stepped,
     connection_name,
 )
+from common.protocol.waves import OLD_NS, SLOW_ECHO_NS, WAVE_ECHOES_EARLY, YOUNG_NS
 from common.protocol.wire import decode, encode_stamped
 from tests.support.samples import CAMERA
 from tests.support.session_world import World, frame

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.protocol.board_session import BoardSession
-from common.protocol.host_path import STUCK_NS
+from common.protocol.host_carriage import STUCK_NS
 from common.protocol.message import (
     BoardCounts,
     BoardHello,

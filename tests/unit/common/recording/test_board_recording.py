@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from board_agent.disk_writer import PARTS, BoundedFiles, DiskWriter, part_path, parts_of
+from board_agent.disk_writer import DiskWriter
+from board_agent.ring import PARTS, BoundedFiles, part_path, parts_of
 from common.errors import SettingsError, UnavailableError
 from common.frame import Frame, PixelFormat
 from common.program.quantities import file_size
