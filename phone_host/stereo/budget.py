@@ -35,8 +35,7 @@ _LEAST_SIDE_PX: Final = 60
 _RANGES: Final = (0.75, 0.5)
 """Shares of the search. Half of it moves the nearest depth to twice the distance."""
 
-_RANGE_STEP: Final = 16
-"""Px: what vectors of 8-bit costs take at once."""
+_RANGE_STEP: Final = 16  # px: what vectors of 8-bit costs take at once
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -249,14 +248,12 @@ def _fit(measured: list[tuple[Step, float]], usual: UsualCost) -> UsualCost:
 
 
 _NEWEST: Final = 5
-_ENOUGH: Final = 3
-"""The median over 3 to 5 pairs tells whether they are too slow: one outlier among them does not move it far."""
+_ENOUGH: Final = 3  # of 3 to 5 pairs the median tells whether they are too slow: one outlier does not move it far
 
 _STEADY: Final = 15
 """The median over so many tells whether there is room: on a busy machine times vary by a third and more."""
 
-_UNCOUNTED: Final = 1
-"""The first pair after a change pays for new buffers and maps."""
+_UNCOUNTED: Final = 1  # the first pair after a change pays for new buffers and maps
 
 _FITS: Final = 0.9
 """A step is good enough in need if it is expected to take this share of the budget."""
