@@ -1,5 +1,7 @@
-"""Takes the pictures of docs/page.md, from rendered scenes: `python -m tests.web.pictures`."""
+"""Takes the pictures in docs/images, from rendered scenes: `python -m tests.web.pictures [live] [scan] [reports]`."""
 
+import subprocess
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -28,13 +30,15 @@ from phone_host.stereo.rectifier import Rectifier
 from phone_host.web.server import PageServer
 from phone_host.web.settings import PageSettings
 from phone_host.web.source import Activity, ScanState, StepName
-from tests.support.boards import BOARD, render_pair
-from tests.support.rigs import small_rig
+from tests.support.boards import BOARD, poses, render_pair
+from tests.support.rigs import small_rig, unlike_rig
 from tests.web.conftest import CHROMIUM, LAPTOP, PHONE
 from tests.web.played import BOARDS, CAMERAS, Played, guide_snapshot, playing, rendered
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "images"
 QUALITY = 82
+PATIENCE_MS = 180_000
+"""Rendering keeps the machine busy."""
 SETTINGS = {"link": BOARDS[1].uri, "camera": CAMERAS[0].uri, "calibration": "rig.yaml"}
 
 
@@ -45,7 +49,7 @@ def keep(page: Any, name: str) -> None:
         page.screenshot(path=path)
         image = cv2.imread(str(path))
     assert image is not None
-    cv2.imwrite(str(FOLDER / f"page-{name}.webp"), image, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
+    cv2.imwrite(str(FOLDER / f"{name}.webp"), image, [cv2.IMWRITE_WEBP_QUALITY, QUALITY])
 
 
 def show(page: Any, step: str) -> None:
@@ -97,68 +101,116 @@ def scanned(views: int) -> tuple[Patches, ScanState]:
     )
 
 
-def main() -> None:
-    """Take them all."""
+def phone_host(*words: object) -> None:
+    """Run a command; an exit code that is not 0 ends this program."""
+    subprocess.run([Path(sys.executable).parent / "phone-host", *map(str, words)], check=True)
+
+
+def take_reports(browser: Any) -> None:
+    """Take the pictures of what commands write: the demo's page, and that of a calibration."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        phone_host("demo", "--out", folder / "demo")
+        sides = folder / "left", folder / "right"
+        for side in sides:
+            side.mkdir()
+        for number, pose in enumerate(poses(16, seed=3)):
+            for side, image in zip(sides, render_pair(unlike_rig(), pose), strict=True):
+                cv2.imwrite(str(side / f"{number:02}.png"), image)
+        phone_host("calibrate", *sides, "--square", "25mm", "--out", folder / "rig" / "rig.yaml")
+        for picture, path, title, width, height in (
+            ("demo", "demo", "A pair, and its depth", 1000, 960),
+            ("delays", "demo", "Where the time goes", 1040, 500),
+            ("calibration", "rig", "What the views cover", 800, 1130),
+        ):
+            page = browser.new_page(viewport={"width": width, "height": height})
+            page.set_default_timeout(PATIENCE_MS)
+            page.goto((folder / path / "index.html").as_uri())
+            page.get_by_role("heading", name=title).evaluate(
+                "heading => scrollTo(0, heading.closest('section').getBoundingClientRect().top - 12)"
+            )
+            page.wait_for_timeout(1000)
+            keep(page, picture)
+            page.close()
+
+
+def take_live(browser: Any) -> None:
+    """Take the pictures of the live page."""
     board, guide = shown_board()
     program = Played((board,))
     server = PageServer(program, PageSettings(port=0))
     server.start()
+    laptop = browser.new_page(viewport=LAPTOP)
+    phone = browser.new_page(viewport=PHONE, color_scheme="dark", device_scale_factor=1.5, has_touch=True)
+    for page in (laptop, phone):
+        page.set_default_timeout(PATIENCE_MS)
+        page.goto(server.url)
+    program.change(
+        activity=Activity.CALIBRATING,
+        guide=guide,
+        begun=1,
+        settings=dict(list(SETTINGS.items())[:2]),
+        done={StepName.BOARD, StepName.CAMERA, StepName.CHECK},
+    )
+    show(laptop, "calibration")
+    program.emit()
+    laptop.wait_for_timeout(900)
+    keep(laptop, "page-calibration")
+    program.change(
+        activity=Activity.RUNNING, guide=None, done=set(StepName) - {StepName.SCAN}, settings=SETTINGS, begun=2
+    )
+    program.pairs = rendered(8)
+    with playing(program, 6):
+        for page in (laptop, phone):
+            show(page, "run")
+            page.wait_for_selector("#views[data-pair]")
+        laptop.wait_for_timeout(6000)
+        box = laptop.locator("#map-frame").bounding_box()
+        for x, y in ((0.6, 0.2), (0.5, 0.92)):
+            laptop.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+        laptop.wait_for_selector("#readout[data-from=program]")
+        laptop.wait_for_timeout(600)
+        keep(laptop, "page-run")
+        laptop.locator(".charts").scroll_into_view_if_needed()
+        laptop.wait_for_timeout(1500)
+        plot = laptop.locator("#chart-delays .u-over").bounding_box()
+        laptop.mouse.move(plot["x"] + 0.6 * plot["width"], plot["y"] + 0.5 * plot["height"])
+        laptop.wait_for_timeout(700)
+        keep(laptop, "page-charts")
+        keep(phone, "page-phone-depth")
+        phone.check("input[value=cloud]", force=True)
+        phone.wait_for_timeout(2500)
+        keep(phone, "page-phone-cloud")
+    server.stop()
+
+
+def take_scan(browser: Any) -> None:
+    """Take the picture of a scan that is over, on the live page."""
+    program = Played(rendered(1), settings=SETTINGS, done=set(StepName), axes="mat")
+    program.patches, program.scan = scanned(24)
+    program.emit()
+    server = PageServer(program, PageSettings(port=0))
+    server.start()
+    page = browser.new_page(viewport={**LAPTOP, "height": 1150})
+    page.set_default_timeout(PATIENCE_MS)
+    page.goto(server.url)
+    show(page, "scan")
+    page.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
+    page.wait_for_timeout(2500)
+    keep(page, "page-scan")
+    server.stop()
+
+
+def main() -> None:
+    """Take them all, or those that are asked for."""
+    takes = {"live": take_live, "scan": take_scan, "reports": take_reports}
     with sync_playwright() as playwright:
         browser: Any = playwright.chromium.launch(
             executable_path=CHROMIUM, args=["--no-sandbox", "--enable-unsafe-swiftshader", "--hide-scrollbars"]
         )
-        laptop = browser.new_page(viewport=LAPTOP)
-        phone = browser.new_page(viewport=PHONE, color_scheme="dark", device_scale_factor=1.5, has_touch=True)
-        for page in (laptop, phone):
-            page.set_default_timeout(180_000)  # ms; rendering keeps the machine busy
-            page.goto(server.url)
-        show(phone, "board")
-        keep(phone, "board")
-        program.change(
-            activity=Activity.CALIBRATING,
-            guide=guide,
-            begun=1,
-            settings=dict(list(SETTINGS.items())[:2]),
-            done={StepName.BOARD, StepName.CAMERA, StepName.CHECK},
-        )
-        show(laptop, "calibration")
-        program.emit()
-        laptop.wait_for_timeout(900)
-        keep(laptop, "calibration")
-        program.change(
-            activity=Activity.RUNNING, guide=None, done=set(StepName) - {StepName.SCAN}, settings=SETTINGS, begun=2
-        )
-        program.pairs = rendered(8)
-        with playing(program, 6):
-            for page in (laptop, phone):
-                show(page, "run")
-                page.wait_for_selector("#views[data-pair]")
-            laptop.wait_for_timeout(6000)
-            box = laptop.locator("#map-frame").bounding_box()
-            for x, y in ((0.6, 0.2), (0.5, 0.92)):
-                laptop.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
-            laptop.wait_for_selector("#readout[data-from=program]")
-            laptop.wait_for_timeout(600)
-            keep(laptop, "run")
-            laptop.locator(".charts").scroll_into_view_if_needed()
-            laptop.wait_for_timeout(1500)
-            plot = laptop.locator("#chart-delays .u-over").bounding_box()
-            laptop.mouse.move(plot["x"] + 0.6 * plot["width"], plot["y"] + 0.5 * plot["height"])
-            laptop.wait_for_timeout(700)
-            keep(laptop, "charts")
-            keep(phone, "phone-depth")
-            phone.check("input[value=cloud]", force=True)
-            phone.wait_for_timeout(2500)
-            keep(phone, "phone-cloud")
-        program.patches, program.scan = scanned(24)
-        program.axes = "mat"
-        program.change(activity=Activity.IDLE, done=set(StepName), begun=3)
-        show(laptop, "scan")
-        laptop.wait_for_function("() => +document.getElementById('scan-model').dataset.parts > 0")
-        laptop.wait_for_timeout(2500)
-        keep(laptop, "scan")
+        for name in sys.argv[1:] or takes:
+            takes[name](browser)
         browser.close()
-    server.stop()
 
 
 if __name__ == "__main__":
