@@ -117,9 +117,6 @@ class ModelFigures:
     """A model in numbers.
 
     Attributes:
-        points: of its surface.
-        triangles: of its surface.
-        size: area, border and extent.
         noise_m: median standard deviation of its points, m; NaN without points.
         noise_p95_m: of which 19 in 20 are better.
         error_scope: what these two cover.
@@ -145,13 +142,9 @@ class ScanReport:
 
     Attributes:
         pairs: in order.
-        model: its figures.
         settings: how the model was made; None: no pair had depth.
         geometry: of the rectified pairs; None: as above.
-        rectified_px: their size.
-        matcher: its name.
         axes: of model.ply.
-        remarks: what the user must know.
         interrupted_of: how many pairs were to be taken when it was interrupted; 0: it was not.
         keeps_field: whether field.bin is written, too.
         mat: on which the object lies; None: there is none.

@@ -11,6 +11,7 @@ from phone_host.bench.report import DelayBenchResult
 from phone_host.report.calibration_result import CalibrationResult, ImportResult
 from phone_host.report.json_result import Absent, types_of
 from phone_host.report.quality_json import QualityResult
+from phone_host.report.scan_json import ScanResult
 from phone_host.report.stereo_json import PairResult, SetResult
 
 SCHEMAS: Final = Path(__file__).parents[2] / "docs" / "schemas"
@@ -19,6 +20,7 @@ RESULTS: Final[dict[str, type]] = {
     "calibrate-import": ImportResult,
     "delay-bench": DelayBenchResult,
     "quality": QualityResult,
+    "scan": ScanResult,
     "stereo": SetResult,
     "stereo-pair": PairResult,
 }

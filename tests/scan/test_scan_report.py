@@ -15,7 +15,7 @@ from phone_host.model import StereoGeometry
 from phone_host.report.model_view import MOST_TRIANGLES, ShownModel, model_view
 from phone_host.report.page_links import NextCommand
 from phone_host.report.report_page import Headline
-from phone_host.report.scan_json import scan_json
+from phone_host.report.scan_json import ScanResult, scan_json
 from phone_host.report.scan_lines import area_text, scan_lines
 from phone_host.report.scan_page import scan_page
 from phone_host.report.scan_report import ModelFigures, ScanReport, scan_verdict, stretches
@@ -25,7 +25,9 @@ from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.surface_error import ErrorScope
 from phone_host.scan.tracking_words import Tracking, Weakness
 from phone_host.scan.volume_settings import VolumeSettings
+from tests.docs.schemas import json_schema
 from tests.support.html import Page
+from tests.unit.report.test_json_result import problems
 
 T, W, L = Tracking.TRACKING, Tracking.WEAK, Tracking.LOST
 MODEL = ModelFigures(
@@ -173,9 +175,11 @@ def test_the_report_is_json_without_times() -> None:
     assert told["pairs"][0]["overlap"] is None
     assert told["pairs"][1]["place_m"] == [0.1, 0, 0]
     assert told["pairs"][2] == {"name": "9", "problem": "l/9.png is cut off", "remedy": "copy it again"}
-    none = scan_json(replace(GOOD, settings=None, geometry=None, interrupted_of=7))
+    none = json.loads(json.dumps(scan_json(replace(GOOD, settings=None, geometry=None, interrupted_of=7))))
     assert (none["focal_px"], none["model"]["voxel_m"], none["interrupted_of"]) == (None, None, 7)
     assert "_ms" not in json.dumps(told)
+    schema = json_schema(ScanResult)
+    assert [problems(values, schema, schema["$defs"]) for values in (told, none)] == [[], []]
 
 
 def test_the_page_shows_the_model_and_what_went_wrong() -> None:
