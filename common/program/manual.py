@@ -30,6 +30,13 @@ complete -o default -F {function} {program}
 """
 
 
+_ZSH: Final = """autoload -Uz compinit bashcompinit
+(( $+functions[compdef] )) || compinit -i
+bashcompinit
+"""
+"""Lets zsh read bash's script. bashcompinit rests on compinit, which a user's .zshrc may not have called, or only calls later."""
+
+
 def verbs_of(parser: argparse.ArgumentParser) -> dict[str, tuple[argparse.ArgumentParser, str]]:
     """Return the parser and the summary of each verb, with all of its options; empty for a program without verbs."""
     for action in parser._actions:  # noqa: SLF001 - argparse tells of them nowhere else
@@ -107,7 +114,7 @@ def completion(parser: argparse.ArgumentParser, shell: str) -> str:
     if shell == "fish":
         return "".join(_fish(parser, known))
     script = _bash(parser, known)
-    return script if shell == "bash" else f"autoload -U bashcompinit\nbashcompinit\n{script}"
+    return script if shell == "bash" else f"{_ZSH}{script}"
 
 
 def _bash(parser: argparse.ArgumentParser, known: dict[str, argparse.ArgumentParser]) -> str:
@@ -140,21 +147,12 @@ def _fish(parser: argparse.ArgumentParser, known: dict[str, argparse.ArgumentPar
     for name, (_, summary) in verbs_of(parser).items():
         yield f"complete -c {parser.prog} -n __fish_use_subcommand -f -a {name} -d {quoted(summary)}\n"
     for name, one in known.items():
-        when = (
-            f"-n '__fish_seen_subcommand_from {name}' "
-            if name
-            else "-n __fish_use_subcommand "
-            if len(known) > 1
-            else ""
-        )
+        place = f"'__fish_seen_subcommand_from {name}'" if name else "__fish_use_subcommand"
+        when = f"-n {place} " if len(known) > 1 else ""
         for each in _options(one):
-            takes = (
-                ""
-                if each.nargs == 0
-                else f"-x -a {quoted(' '.join(map(str, each.choices)))} "
-                if each.choices
-                else "-r "
-            )
+            takes = "" if each.nargs in {0, "?", "*"} else "-r "
+            if each.choices:
+                takes += f"-f -a {quoted(' '.join(map(str, each.choices)))} "
             for flag in each.option_strings:
                 kind = "-l " if flag.startswith("--") else "-s "
                 yield f"complete -c {parser.prog} {when}{kind}{flag.lstrip('-')} {takes}-d {quoted(_help(each))}\n"
