@@ -9,12 +9,14 @@ from typing import Final
 import numpy as np
 
 from common import now
-from common.camera.factory import open_camera
 from common.ledger import PairLedger
-from common.link.factory import open_link, parse_link
-from common.stamp import HOST_CLOCK
+from common.program.settings import Resolved
 from common.words import counted
+from phone_host.declared_settings import PhoneHostSettings
 from phone_host.diagnostics.run_snapshot import RunSnapshot
+from phone_host.jobs.options import RunCameraOptions
+from phone_host.jobs.run import Opened, open_run
+from phone_host.jobs.run_request import RunRequest
 from phone_host.model import CloudImage, Processed, Result, Rig, Side
 from phone_host.output.ply import write_ply
 from phone_host.output.preview import disparity_picture, write_png
@@ -32,8 +34,6 @@ from phone_host.report.run_page import (
     steps,
     unused_table,
 )
-from phone_host.run.host import Host
-from phone_host.run.host_settings import HostSettings
 from phone_host.run.sinks import FunctionSink
 from phone_host.scene.film import Film
 from phone_host.scene.scene import truth
@@ -54,7 +54,7 @@ _CHECKED_PAIRS: Final = 8
 """Number of pairs whose depth is compared with the truth; each costs about 0.1 s afterwards."""
 
 _CHECK_EVERY: Final = 15
-_BOARD_PATIENCE_NS: Final = 10_000_000_000
+_BOARD_PATIENCE_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +105,13 @@ class DepthErrors:
     wrong_pairs: int
 
 
+def open_demo(camera: str, address: str, core: StereoCore, out: Path | None) -> Opened:
+    """Open a run of a camera's URI and a board that will listen at an address, with a folder for the results, or None."""
+    request = RunRequest(command="demo", cameras=RunCameraOptions(wait_s=_BOARD_PATIENCE_S), out=out, save_every=0)
+    found = Resolved(PhoneHostSettings(link=(address,), camera=camera), (("matcher", "demo"),))
+    return open_run(request, found, lambda _: None, core=core)
+
+
 class DemoRun:
     """One run of both programs over a film.
 
@@ -125,10 +132,8 @@ class DemoRun:
         self.address = f"ipc://{sockets}/board"
         near = disparities_for_near(self._rectifier.geometry, NEAR_M, self._rectifier.rectification.width_px)
         core = StereoCore(MatchSettings(disparities=near), self._rectifier)
-        camera = open_camera(film.replay_uri(film.right), HOST_CLOCK, now.monotonic_ns())
-        link = open_link(parse_link(self.address, listens_by_default=False))
-        settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=out, save_every=0, resolved=resolved, command="demo")
-        self.host = Host(settings, camera, [link], core, [FunctionSink("check", self._keep, waits=True)])
+        opened = open_demo(film.replay_uri(film.right), self.address, core, out)
+        self.host = opened.prepared((), [FunctionSink("check", self._keep, waits=True)], resolved).host
 
     @property
     def last(self) -> CheckedPair | None:

@@ -13,16 +13,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from common import now
-from common.camera.factory import open_camera
 from common.diagnostic import Diagnostic, Severity
-from common.link.factory import open_link, parse_link
-from common.stamp import HOST_CLOCK
+from phone_host.demo.demonstration import open_demo
+from phone_host.jobs.scan import prepare_scan
 from phone_host.model import Side
 from phone_host.output.axes import Axes
-from phone_host.run.host import Host
-from phone_host.run.host_settings import EndReason, HostSettings
-from phone_host.run.live_scan import LiveScan
+from phone_host.run.host_settings import EndReason
 from phone_host.run.scan_job import FinishedScan
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.mesh import Mesh
@@ -136,8 +132,6 @@ def _near(points: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[n
 NEAR_M: Final = 0.25
 """Nearest depth searched: the thing begins 0.35 m before the cameras, and the mat's lower edge at 0.28 m."""
 
-_BOARD_PATIENCE_NS: Final = 10_000_000_000
-
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
@@ -216,12 +210,10 @@ class ScanDemo:
         near = disparities_for_near(rectifier.geometry, NEAR_M, rectifier.rectification.width_px)
         core = StereoCore(MatchSettings(matcher, near), rectifier)
         wanted = ScanWanted(mat=parse_mat(USUAL_MAT), threads=matching_threads())
-        self.live = LiveScan(wanted, Side.LEFT, out, waits=True, is_timeless=True)
         self._address = f"ipc://{sockets}/board"
-        camera = open_camera(f"replay:{pictures.right}", HOST_CLOCK, now.monotonic_ns())
-        link = open_link(parse_link(self._address, listens_by_default=False))
-        settings = HostSettings(wait_ns=_BOARD_PATIENCE_NS, out=None, save_every=0)
-        self._host = Host(settings, camera, [link], core, [self.live.sink])
+        opened = open_demo(f"replay:{pictures.right}", self._address, core, None)
+        scan = prepare_scan(opened, opened.found, wanted, Axes.MAT, out, tell=lambda _: None)
+        self.live, self._host = scan.live, scan.host
 
     def run(self, stop: Callable[[], bool], watch: Callable[[], None] | None) -> EndReason:
         """Scan until the last view, or until it is stopped.

@@ -92,7 +92,7 @@ class Opened:
             for link in self.links:
                 opened.enter_context(closing(link))
             if self.request.out is not None:
-                announce_other_report(self.request.out, "run", self.tell)
+                announce_other_report(self.request.out, self.request.command, self.tell)
             settings = _host_settings(self, words, told)
             recording = self._recording(settings)
             if recording is not None and self.request.record_topics:
@@ -362,4 +362,5 @@ def _host_settings(opened: Opened, words: Sequence[str], told: Mapping[str, obje
         steered=frozenset(whose for whose in Whose if settings.align_phase in {"either", whose.value}),
         budget=budget_wanted(request, found, core),
         overlay=overlay_of(request.depth, core),
+        command=request.command,
     )

@@ -37,8 +37,9 @@ def _topics(text: str, option: str) -> frozenset[Computed]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRequest(Request):
-    """What a run can be told."""
+    """What a run can be told. `command` is the verb whose results these are."""
 
+    command: str = "run"
     cameras: RunCameraOptions = part(RunCameraOptions, group="cameras and links")
     depth: LimitedDepthOptions = part(LimitedDepthOptions, group="depth")
     no_correction: bool = option(
