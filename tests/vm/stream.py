@@ -108,6 +108,10 @@ class Stream:
         wanted = self.pairs + pairs
         self.until(lambda: self.pairs >= wanted, f"{pairs} pairs {when}")
 
+    def until_said(self, words: str, what: str, times: int = 1, patience_s: float = PATIENCE_S) -> None:
+        """Wait until the host has said this so often."""
+        self.until(lambda: self.receiver.stderr.count(words) >= times, what, patience_s)
+
     def until(self, condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S) -> None:
         """Wait for a condition; after a minute, or when the host has ended, fail with what the host says."""
         deadline = time.monotonic() + patience_s

@@ -79,7 +79,7 @@ def _switch_off_and_on(guest: Guest, adapters: str, stream: Stream) -> None:
     lost = stream.receiver.stderr.count("board_gone")
     guest.sh(f"for h in {adapters}; do hciconfig $h down; done")
     guest.until("StatusText", "waiting for a host", "the board gives the host up")
-    stream.until(lambda: stream.receiver.stderr.count("board_gone") > lost, "the host gives the board up")
+    stream.until_said("board_gone", "the host gives the board up", lost + 1)
     guest.sh(SWITCH_ON)
 
 

@@ -156,7 +156,7 @@ def test_a_camera_out_of_step_is_steered_by_restarting_it(
     starts = webcam.starts
     with streaming(guest, film.right, tmp_path / "out", ("--align-phase", "board")) as stream:
         # Twelve tries of a few seconds, if starts scatter.
-        stream.until(lambda: "state=aligned" in stream.receiver.stderr, "both cameras are in step", 2 * PATIENCE_S)
+        stream.until_said("state=aligned", "both cameras are in step", patience_s=2 * PATIENCE_S)
         period_ms = 1000 / FPS
         phase_ms = (webcam.phase_ns / 1e6 + period_ms / 2) % period_ms - period_ms / 2
         stream.more(5, "in step")

@@ -156,7 +156,7 @@ def test_a_cut_link_heals(guest: Guest, film: Film, skew: Skew, tmp_path: Path) 
         guest.sh(f"ip link set {NETWORK_CARD} down")
         try:
             guest.until("StatusText", "waiting for a host", "the board gives the host up")
-            stream.until(lambda: "board_gone" in stream.receiver.stderr, "the host gives the board up")
+            stream.until_said("board_gone", "the host gives the board up")
         finally:
             guest.sh(f"ip link set {NETWORK_CARD} up")
         stream.more(10, "after the cut")

@@ -108,9 +108,7 @@ def test_a_cable_pulled_and_replugged(serving: Guest, film: Film, skew: Skew, tm
             lost = stream.receiver.stderr.count("board_gone")
             serving.sh(f"echo > {OURS}/UDC")
             serving.until("StatusText", "waiting for a host", "the board gives the host up")
-            stream.until(
-                lambda lost=lost: stream.receiver.stderr.count("board_gone") > lost, "the host gives the board up"
-            )  # type: ignore[misc]  # bound now
+            stream.until_said("board_gone", "the host gives the board up", lost + 1)
             assert serving.code(f"test -e {HOST_END}") != 0
             serving.sh(f"echo {CONTROLLER} > {OURS}/UDC")
             stream.more(10, "after the plug")
