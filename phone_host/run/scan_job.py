@@ -3,13 +3,13 @@
 `run_scan` is the root of `scan` for files. After Ctrl-C or SIGTERM the model of the pairs so far is written.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as default
 from pathlib import Path
 from typing import Any, Final
 
-from common.diagnostic import Diagnostic
+from common.diagnostic import Diagnostic, Severity
 from common.errors import DataError
 from common.words import counted
 from phone_host.diagnostics.codes import as_remark
@@ -207,6 +207,22 @@ def finished_scan(
     return FinishedScan(report, model, field=field_of_turn(scan))
 
 
+def _of_model(of_pairs: Sequence[tuple[str, Diagnostic]], fused: Collection[str]) -> Diagnostic:
+    """Return a doubt about the images of pairs as one about the model: it is no failure, and names a pair, where none of these is in the model.
+
+    Args:
+        of_pairs: names of pairs, and the doubt; at least one.
+        fused: names of the pairs in the model.
+    """
+    of_fused = [doubt for name, doubt in of_pairs if name in fused]
+    name, doubt = of_pairs[0]
+    if of_fused or not fused:
+        return of_fused[0] if of_fused else doubt
+    return replace(
+        doubt, message=f"pair {name}: {doubt.message}", severity=Severity.WARN if doubt.is_failure else doubt.severity
+    )
+
+
 def run_scan(
     pairs: FilePairs, wanted: ScanWanted, watcher: Watcher, axes: Axes = Axes.CAMERA, resumed: tuple[Submap, ...] = ()
 ) -> ScanReport:
@@ -232,7 +248,7 @@ def run_scan(
             "take more of them, each sharing most of what the last one shows; for one pair there is `phone-host stereo`",
         )
     work = ScanWork(wanted, pairs.out, resumed, pairs.tell)
-    doubts: dict[str, Diagnostic] = {}
+    doubts: dict[str, list[tuple[str, Diagnostic]]] = {}
     is_judged = False
 
     def take(pair: ComputedPair) -> ScannedPair:
@@ -242,14 +258,16 @@ def run_scan(
         if number & (number - 1) == 0 or not is_judged:
             is_judged = True
             for concern in judge_pair(pair.core, pair.processed, pairs.mounted).concerns:
-                doubts.setdefault(concern.code, as_remark(concern))
+                doubts.setdefault(concern.code, []).append((name, as_remark(concern)))
         scanned = work.scan.take(name, float(name) if pairs.files.by_number else float(number), pair.processed)
         if scanned.weakness.advice:
             watcher.say(f"{name}: {scanned.weakness.advice}")
         return scanned
 
     def finished(done: Sequence[ScannedPair | FailedPair]) -> FinishedScan:
-        return work.finished((*doubts.values(), *pairs.remarks), done, matcher=pairs.matcher, axes=axes)
+        fused = {pair.name for pair in work.scan.pairs if pair.is_fused}
+        remarks = (*(_of_model(of_pairs, fused) for of_pairs in doubts.values()), *pairs.remarks)
+        return work.finished(remarks, done, matcher=pairs.matcher, axes=axes)
 
     def keep(done: Sequence[ScannedPair | FailedPair]) -> None:
         if work.scan.fused:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -108,6 +109,20 @@ def test_a_walk_around_a_still_life_gives_its_surfaces(walk: Path, tmp_path: Pat
     scan_here(walk, tmp_path / "two")
     for name in ("model.ply", "trajectory.txt", "report.json", "index.html"):
         assert written(tmp_path / "one", name) == written(tmp_path / "two", name)
+
+
+def test_a_wrong_picture_does_not_condemn_the_model_of_the_others(walk: Path, tmp_path: Path) -> None:
+    """A picture of something else is named with its pair, which is not in the model; it is no failure."""
+    wrong = tmp_path / "wrong"
+    shutil.copytree(walk, wrong)
+    first, *_ = sorted((wrong / "left").iterdir())
+    camera = small_rig().left
+    other = np.random.default_rng(1).integers(0, 255, (camera.height_px // 4, camera.width_px // 4, 3), np.uint8)
+    cv2.imwrite(str(first), cv2.resize(other, (camera.width_px, camera.height_px), interpolation=cv2.INTER_CUBIC))
+    report = scan_here(wrong, tmp_path / "one")
+    assert (report.fused, report.is_sound) == (4, True)
+    told = [remark for remark in report.remarks if "different scenes" in remark.message]
+    assert [(remark.message[:7], remark.is_failure) for remark in told] == [("pair 0:", False)]
 
 
 def test_what_somebody_moved_meanwhile_does_not_spoil_the_rest(walk: Path, tmp_path: Path) -> None:
