@@ -1,41 +1,57 @@
 """Shows how a run held its time budget: for report.json and for the page. Pure."""
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
-from phone_host.model import BudgetAccount, BudgetStep
-from phone_host.output.json_text import json_number
+from phone_host.model import BudgetAccount, BudgetChange, BudgetReason, BudgetStep
+from phone_host.report.json_result import D3, D4, FieldOf, Number, made
 from phone_host.report.report_page import Table
 
 _MS: Final = 1e6
 
 
-def budget_values(account: BudgetAccount | None) -> dict[str, object] | None:
-    """Return the account for report.json; times in ms, None where nothing was measured. None without a budget."""
-    if account is None:
-        return None
-    return {
-        "budget_ms": account.budget_ns / _MS,
-        "processing_ms": _ms(account.processing_ns),
-        "match_ms": _ms(account.match_ns),
-        "pairs": account.pairs,
-        "held_pairs": account.held,
-        "narrowed_pairs": account.narrowed,
-        "is_missed": account.is_missed,
-        "chosen": _step(account.now),
-        "best": _step(account.best),
-        "changed": account.changed,
-        "changes": [
-            {
-                "pair": change.pair,
-                "at_s": round(change.at_s, 3),
-                "reason": change.reason.value,
-                "processing_ms": _ms(change.processing_ns),
-                "chosen": _step(change.step),
-            }
-            for change in account.changes
-        ],
-    }
+_step, _change, _account = FieldOf[BudgetStep](), FieldOf[BudgetChange](), FieldOf[BudgetAccount]()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepResult:
+    """A way to match pairs."""
+
+    matcher: str
+    scale: D4
+    width_px: int
+    height_px: int
+    disparities: int
+    nearest_m: Number
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeOfStep:
+    """From which pair on, and why, pairs were matched in another way."""
+
+    pair: int
+    at_s: D3
+    reason: BudgetReason
+    processing_ms: Number = _change(lambda change: change.processing_ns / _MS)
+    chosen: StepResult = _change(lambda change: made(StepResult, change.step))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BudgetResult:
+    """How the time budget for each pair was held."""
+
+    budget_ms: float = _account(lambda account: account.budget_ns / _MS)
+    processing_ms: Number = _account(lambda account: account.processing_ns / _MS)
+    match_ms: Number = _account(lambda account: account.match_ns / _MS)
+    pairs: int
+    held_pairs: int = _account(lambda account: account.held)
+    narrowed_pairs: int = _account(lambda account: account.narrowed)
+    is_missed: bool
+    chosen: StepResult = _account(lambda account: made(StepResult, account.now))
+    best: StepResult = _account(lambda account: made(StepResult, account.best))
+    changed: int
+    changes: tuple[ChangeOfStep, ...] = _account(lambda account: made(ChangeOfStep, account.changes))
 
 
 def budget_tables(account: BudgetAccount | None) -> tuple[Table, ...]:
@@ -54,18 +70,3 @@ def budget_tables(account: BudgetAccount | None) -> tuple[Table, ...]:
     )
     heads = ("after", "pairs took", "matcher then", "size, px", "disparities")
     return (Table(f"Changes to hold {account.budget_ns / _MS:g} ms for each pair", heads, rows),)
-
-
-def _step(step: BudgetStep) -> dict[str, object]:
-    return {
-        "matcher": step.matcher,
-        "scale": round(step.scale, 4),
-        "width_px": step.width_px,
-        "height_px": step.height_px,
-        "disparities": step.disparities,
-        "nearest_m": json_number(step.nearest_m),
-    }
-
-
-def _ms(value_ns: float) -> float | None:
-    return json_number(value_ns / _MS)

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Final, Generic, TypeVar, cast, get_args, get_origin, get_type_hints
 
+from common.diagnostic import Diagnostic
 from phone_host.output.json_text import json_number
 
 D1 = Annotated[float, 1]
@@ -75,7 +76,9 @@ def result_values(kind: type, source: Any) -> Any:  # noqa: ANN401
 
 
 def json_values(result: Any) -> dict[str, Any]:  # noqa: ANN401 - whatever dataclass
-    """Return a result as what JSON holds: keys in the order of its fields."""
+    """Return a result as what JSON holds: keys in the order of its fields; of a diagnostic, problem and remedy."""
+    if isinstance(result, Diagnostic):
+        return {"problem": result.message, "remedy": result.remedy}
     types = types_of(type(result))  # type: ignore[arg-type]  # a class is hashable
     told = ((name, getattr(result, name)) for name in types)
     return {name.rstrip("_"): _value(value, _digits(types[name])) for name, value in told if value is not ABSENT}
@@ -86,6 +89,11 @@ def types_of(kind: type) -> dict[str, Any]:
     """Return the types of a class of results by its fields, in their order."""
     hints = get_type_hints(kind, include_extras=True)
     return {field.name: hints[field.name] for field in fields(kind)}
+
+
+def problem_values(found: Diagnostic | None) -> dict[str, Any] | None:
+    """Return what is wrong and what helps; None: nothing is."""
+    return None if found is None else json_values(found)
 
 
 def _digits(hint: Any) -> int | None:  # noqa: ANN401

@@ -34,7 +34,7 @@ from phone_host.output.json_text import json_text
 from phone_host.output.rig_files.imported import read_own_rig
 from phone_host.recording.footage import take_alone, take_frames
 from phone_host.recording.recorder import UnpairedFrames, begin_recording
-from phone_host.report.run_json import recording_values
+from phone_host.report.json_result import json_values
 from phone_host.run.progress_bar import step_bar
 from phone_host.settings import check, key_folder, resolve_settings
 
@@ -142,7 +142,7 @@ def _film(
 
 def _tell(account: RecordingAccount, *, as_json: bool, is_interrupted: bool) -> int:
     if as_json:
-        print(json_text({"format_version": REPORT_FORMAT, "command": "record", **recording_values(account)}))
+        print(json_text({"format_version": REPORT_FORMAT, "command": "record", **json_values(account)}))
     else:
         print(fitted(account.words))
     if is_interrupted:

@@ -11,7 +11,7 @@ from common import now
 from common.diagnostic import Diagnostic, Severity, diagnostic_of
 from common.errors import TandemError
 from phone_host.output.json_text import json_text
-from phone_host.report.run_json import problem_values
+from phone_host.report.json_result import problem_values
 from phone_host.web.connections import Connections
 from phone_host.web.gate import Asked, Gate, Kind, Passed, Refusal
 from phone_host.web.rates import Rate, Rates

@@ -15,9 +15,8 @@ from phone_host.diagnostics.run_rules import concerns
 from phone_host.diagnostics.run_snapshot import RecordingAccount, RunSnapshot, unused
 from phone_host.model import DepthAccount, Unwritten
 from phone_host.output.json_text import json_number, json_text
-from phone_host.report.json_result import result_values
+from phone_host.report.json_result import json_values, problem_values, result_values
 from phone_host.report.match_words import cut_sentence
-from phone_host.report.run_json import problem_values, recording_values
 from phone_host.report.stereo_trust import Doubt
 from phone_host.web.source import Answer, Choice, Measured, PageState, Step, StepName
 
@@ -199,7 +198,7 @@ def _unsaved(unwritten: Unwritten) -> dict[str, object] | None:
 
 
 def _recording(account: RecordingAccount) -> dict[str, object]:
-    return recording_values(account) | {"words": account.words}
+    return json_values(account) | {"words": account.words}
 
 
 def _trust(run: RunSnapshot, steps: Sequence[Step]) -> dict[str, object]:

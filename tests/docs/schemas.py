@@ -7,10 +7,12 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
+from common.diagnostic import Diagnostic
 from phone_host.bench.report import DelayBenchResult
 from phone_host.report.calibration_result import CalibrationResult, ImportResult
 from phone_host.report.json_result import Absent, types_of
 from phone_host.report.quality_json import QualityResult
+from phone_host.report.run_json import RunResult
 from phone_host.report.scan_json import ScanResult
 from phone_host.report.stereo_json import PairResult, SetResult
 
@@ -20,6 +22,7 @@ RESULTS: Final[dict[str, type]] = {
     "calibrate-import": ImportResult,
     "delay-bench": DelayBenchResult,
     "quality": QualityResult,
+    "run": RunResult,
     "scan": ScanResult,
     "stereo": SetResult,
     "stereo-pair": PairResult,
@@ -41,7 +44,7 @@ def json_schema(kind: type) -> dict[str, Any]:
 
 
 def _object(kind: type, parts: dict[str, Any]) -> dict[str, Any]:
-    types = types_of(kind)
+    types = {"problem": str, "remedy": str} if kind is Diagnostic else types_of(kind)
     needed = [name.rstrip("_") for name, hint in types.items() if Absent not in get_args(hint)]
     return {
         "type": "object",

@@ -20,14 +20,16 @@ from phone_host.report.calibration_report import ImportReport, Judged
 from phone_host.report.calibration_result import calibration_values, import_values
 from phone_host.report.json_result import ABSENT, D2, Absent, json_values
 from phone_host.report.quality_json import quality_json
+from phone_host.report.run_json import build
 from phone_host.report.stereo_json import pair_json, set_json
 from phone_host.report.stereo_report import FailedPair, SetReport
 from tests.docs.schemas import RESULTS, SCHEMAS, json_schema, text_of
-from tests.support import quality_pages
+from tests.support import quality_pages, run_snapshots
 from tests.support.bench_results import UNDER, analysed, result, slower
 from tests.support.calibration_series import calibration, calibration_report
 from tests.support.rigs import unlike_rig
 from tests.unit.diagnostics.test_drift_words import KNOCK
+from tests.unit.report.test_report_keys import eventful_run
 from tests.unit.report.test_stereo_report import BAD, PAIR
 
 KINDS: dict[str, Any] = {
@@ -143,6 +145,8 @@ def test_reports_fit_their_schemas() -> None:
         ("calibrate-import", import_values(imported)),
         ("delay-bench", as_json(runs, UNDER, analysed(*runs))),
         ("delay-bench", as_json([nothing], UNDER, analysed(nothing))),
+        ("run", build(eventful_run())),
+        ("run", build(run_snapshots.run(31))),
         ("quality", quality_json(quality_pages.report(failed=True))),
         ("stereo-pair", pair_json(PAIR)),
         ("stereo-pair", pair_json(few)),

@@ -56,7 +56,7 @@ def described_words(*headings: str) -> set[str]:
     return {word for section in sections for word in re.findall(r"`(\w+)`", section)}
 
 
-def _eventful_run() -> RunSnapshot:
+def eventful_run() -> RunSnapshot:
     """A run in which everything happened that has keys of its own."""
     estimate = ClockEstimate(
         reference_ns=0, offset_ns=5_000, skew=2e-6, skew_uncertainty=1e-7, uncertainty_ns=30_000,
@@ -112,7 +112,7 @@ def test_every_key_of_a_report_of_quality_is_described() -> None:
 
 def test_every_key_of_a_report_of_run_is_described() -> None:
     """That of a run with absences, doubts, losses and an alignment; what `stereo` has, too, is described there."""
-    keys = keys_of(build(_eventful_run()))
+    keys = keys_of(build(eventful_run()))
     assert len(keys) >= 120
     assert keys <= described_words("What `--json` prints", "report.json of `stereo`", "report.json of `run`")
 
