@@ -208,7 +208,9 @@ class Reception:
         if (frames := self._sink.room()) is None:
             round_trip_ns = self._paced_round_trip_ns() if self._is_paced else None
             frames = self._flow.credit(self._session.outstanding, self.hello.camera.period_ns, round_trip_ns)
-        if frames and self._border.takes_frames:  # without a clock, frames could not be paired
+        else:
+            frames -= self._border.held  # they have come, and will be let in together
+        if frames > 0 and self._border.takes_frames:  # without a clock, frames could not be paired
             self._handle(self._session.grant(frames), now_ns)
 
     def _paced_round_trip_ns(self) -> int | None:

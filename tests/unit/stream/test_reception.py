@@ -16,6 +16,7 @@ from common.protocol.message import (
     Knock,
     Lane,
     Pacing,
+    Ping,
     Pong,
     Refusal,
     RefusalReason,
@@ -191,6 +192,30 @@ def test_a_board_sends_what_the_sink_has_room_for(sink: FrameSink, leave: int) -
     assert sent == leave
     assert talk.reception.estimate is not None
     assert talk.reception.hello is not None
+
+
+class OnePlace(Choosy):
+    """Has room for one frame, and for no other."""
+
+    def room(self) -> int:
+        """One, until a frame has come."""
+        return 1 - len(self.taken)
+
+
+def test_a_frame_that_waits_for_an_echo_takes_up_room() -> None:
+    """A board is granted no second frame while the one that fills the last place still waits for an echo; both would come at once."""
+    talk = Talk(sink=(sink := OnePlace()))
+    talk.run()
+    talk.board.sent(talk.now_ns)
+    talk.show(talk.frame())
+    for _ in range(20):
+        talk.now_ns += 10 * MS
+        talk.reception.tick(talk.now_ns)
+        talk.said[:] = [outgoing for outgoing in talk.said if not isinstance(outgoing.message, Ping)]
+        talk.answer()
+    assert (sink.taken, talk.board.has_credit) == ([], False)
+    talk.run(300)
+    assert (sink.taken, talk.board.has_credit) == ([0], False)
 
 
 def test_labels_beside_a_clock_are_dropped_by_name() -> None:
