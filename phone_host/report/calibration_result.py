@@ -10,16 +10,20 @@ import numpy as np
 
 from common.errors import DataError
 from common.imagesize.head import size_text
-from common.orientation import UPRIGHT
+from common.orientation import UPRIGHT, Orientation
 from common.versions import REPORT_FORMAT
 from phone_host.calibration.failure_modes.mistakes import Turned
-from phone_host.calibration.solve.verdict import Calibration, Used
+from phone_host.calibration.guide.snapshot import GuideSnapshot
+from phone_host.calibration.solve.verdict import Calibration, LensTrial, Used
 from phone_host.calibration.target.board_views import BoardViews
 from phone_host.model import CameraModel, Rig
-from phone_host.report.calibration_report import CalibrationReport, Exported, ImportReport, Judged
-from phone_host.report.json_result import ABSENT, D1, D2, D3, D4, D6, Absent, json_values
+from phone_host.report.calibration_report import CalibrationReport, Exported, ImportReport, Judged, Known
+from phone_host.report.json_result import ABSENT, D1, D2, D3, D4, D6, Absent, FieldOf, json_values, made
 
 _SIDES: Final = ("left", "right")
+
+_used, _trial, _turn, _turned = FieldOf[Used](), FieldOf[LensTrial](), FieldOf[Orientation](), FieldOf[Turned]()
+_live, _board, _import = FieldOf[GuideSnapshot](), FieldOf[Known](), FieldOf[ImportReport]()
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,19 +45,19 @@ class CalibrationPairs:
     rejected: tuple[RejectedPair, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ViewErrors:
     """How well a view fits, and how the rig sees its board; without rectification there is no vertical error."""
 
-    pair: str
+    pair: str = _used(lambda used: used.name)
     left_px: D4
     right_px: D4
     vertical_px: D4 | None
-    rays_miss_sigmas: D3 | None
-    board_size: D6 | None
-    board_size_sigma: D6 | None
-    board_bow_mm: D3 | None
-    board_bow_sigma_mm: D3 | None
+    rays_miss_sigmas: D3 | None = _used(lambda used: used.in_space.miss)
+    board_size: D6 | None = _used(lambda used: used.in_space.size)
+    board_size_sigma: D6 | None = _used(lambda used: used.in_space.size_sigma)
+    board_bow_mm: D3 | None = _used(lambda used: used.in_space.bow_m[0] * 1e3)
+    board_bow_sigma_mm: D3 | None = _used(lambda used: used.in_space.bow_m[1] * 1e3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +82,9 @@ class VerticalError:
 class LensTried:
     """How a formula predicts views that it has not seen."""
 
-    kind: str
-    coefficients: int
-    held_out_px: D4
+    kind: str = _trial(lambda trial: trial.bend.lens.value)
+    coefficients: int = _trial(lambda trial: trial.bend.terms)
+    held_out_px: D4 = _trial(lambda trial: trial.rms_px)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,28 +141,28 @@ class Turn:
     """How images are turned."""
 
     rotate_deg: int
-    flip: str
+    flip: str = _turn(lambda turn: turn.flip.value)
 
 
 @dataclass(frozen=True, slots=True)
 class BoardTold:
     """The board, and who said how many corners it has."""
 
-    inner_corners: str
-    from_: str
-    square_mm: D6
+    inner_corners: str = _board(lambda known: size_text((known.board.columns, known.board.rows)))
+    from_: str = _board(lambda known: known.origin.value)
+    square_mm: D6 = _board(lambda known: known.board.square_m * 1e3)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CamerasTurned:
     """How the cameras turned against each other: about the right camera's x, y and z axis, from a pair on if at once."""
 
-    course: str
-    turn_deg: tuple[D4, ...]
-    sigma_deg: tuple[D4, ...]
-    from_pair: str | None
+    course: str = _turned(lambda turned: turned.course.value)
+    turn_deg: tuple[D4, ...] = _turned(lambda turned: tuple(math.degrees(each) for each in turned.turn_rad))
+    sigma_deg: tuple[D4, ...] = _turned(lambda turned: tuple(math.degrees(each) for each in turned.sigma_rad))
+    from_pair: str | None = _turned(lambda turned: turned.names[turned.begins] if turned.begins >= 0 else None)
     rows_px: D3
-    depth_at_1_m_mm: D2
+    depth_at_1_m_mm: D2 = _turned(lambda turned: turned.depth_at_1_m_m * 1e3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,14 +176,14 @@ class Cause:
     turned: CamerasTurned | Absent = ABSENT
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LiveTold:
     """How the pictures were taken."""
 
-    ended: str
+    ended: str = _live(lambda live: live.ended.value)
     views: int
     seconds: D1
-    refused: Mapping[str, int]
+    refused: Mapping[str, int] = _live(lambda live: {gate.value: count for gate, count in live.refused})
 
 
 Files = Mapping[str, tuple[Path, ...]]
@@ -237,19 +241,23 @@ class ImportResult:
 
     format_version: int = REPORT_FORMAT
     command: str = "calibrate"
-    imported: ImportedFrom
-    baseline_mm: D4
-    focal_px: Mapping[str, tuple[D3, ...]]
-    sizes: Mapping[str, str]
-    board_side: str
-    verdict: str | None
-    earlier_rig: str | Absent = ABSENT
-    exported: Files | Absent = ABSENT
+    imported: ImportedFrom = _import(
+        lambda report: made(ImportedFrom, report.imported, kind=report.imported.kind.value)
+    )
+    baseline_mm: D4 = _import(lambda report: _baseline_mm(report.imported.rig))
+    focal_px: Mapping[str, tuple[D3, ...]] = _import(lambda report: _focal_px(report.imported.rig))
+    sizes: Mapping[str, str] = _import(lambda each: {side: _size(model) for side, model in _cameras(each.imported.rig)})
+    board_side: str = _import(lambda report: report.imported.rig.board_side.value)
+    verdict: str | None = _import(
+        lambda each: None if each.imported.rig.verdict is None else each.imported.rig.verdict.value
+    )
+    earlier_rig: str | Absent = _import(lambda report: report.earlier_rig or ABSENT)
+    exported: Files | Absent = _import(lambda report: _files(report.exported) or ABSENT)
 
 
 def calibration_values(report: CalibrationReport) -> dict[str, Any]:
     """Return what report.json holds of a calibration from pictures."""
-    files, result, live, board = report.files, report.result, report.live, report.known.board
+    files, result = report.files, report.result
     rejected = tuple(RejectedPair(each.name, each.reason.value, each.detail) for each in report.rejected)
     used = 0 if isinstance(result, DataError) else len(result.found.used)
     paired_by = "number" if files.by_number else "name" if files.by_name else "name order"
@@ -258,12 +266,10 @@ def calibration_values(report: CalibrationReport) -> dict[str, Any]:
         exif_orientation=_turns(report.views) or ABSENT,
         verdict=report.verdict.value,
         remedy=report.remedy,
-        board=BoardTold(size_text((board.columns, board.rows)), report.known.origin.value, board.square_m * 1e3),
+        board=made(BoardTold, report.known),
         earlier_rig=report.earlier_rig or ABSENT,
         exported=_files(report.exported) or ABSENT,
-        live=ABSENT
-        if live is None
-        else LiveTold(live.ended.value, live.views, live.seconds, {gate.value: count for gate, count in live.refused}),
+        live=made(LiveTold, report.live) or ABSENT,
         page=report.page,
     )
     if isinstance(result, DataError):
@@ -275,18 +281,7 @@ def calibration_values(report: CalibrationReport) -> dict[str, Any]:
 
 def import_values(report: ImportReport) -> dict[str, Any]:
     """Return what report.json holds of a calibration of another program."""
-    found, rig = report.imported, report.imported.rig
-    result = ImportResult(
-        imported=ImportedFrom(found.kind.value, found.files, found.notes),
-        baseline_mm=_baseline_mm(rig),
-        focal_px=_focal_px(rig),
-        sizes={side: _size(model) for side, model in _cameras(rig)},
-        board_side=rig.board_side.value,
-        verdict=None if rig.verdict is None else rig.verdict.value,
-        earlier_rig=report.earlier_rig or ABSENT,
-        exported=_files(report.exported) or ABSENT,
-    )
-    return json_values(result)
+    return json_values(made(ImportResult, report))
 
 
 def _files(exported: tuple[Exported, ...]) -> Files:
@@ -296,26 +291,15 @@ def _files(exported: tuple[Exported, ...]) -> Files:
 def _turns(views: BoardViews) -> dict[str, Turn]:
     """Return what the EXIF headers of the sides say, where it changes anything."""
     sides = zip(_SIDES, views.turned, strict=True)
-    return {side: Turn(turn.rotate_deg, turn.flip.value) for side, turn in sides if turn != UPRIGHT}
+    return {side: made(Turn, turn) for side, turn in sides if turn != UPRIGHT}
 
 
 def _cause(result: Judged) -> Cause | None:
     finding = result.finding
     if finding is None:
         return None
-    turned = ABSENT if finding.evidence.turned is None else _turned(finding.evidence.turned)
+    turned = made(CamerasTurned, finding.evidence.turned) or ABSENT
     return Cause(finding.code, result.cause_words, finding.remedy, finding.evidence.explained_px, turned)
-
-
-def _turned(turned: Turned) -> CamerasTurned:
-    return CamerasTurned(
-        course=turned.course.value,
-        turn_deg=tuple(math.degrees(each) for each in turned.turn_rad),
-        sigma_deg=tuple(math.degrees(each) for each in turned.sigma_rad),
-        from_pair=turned.names[turned.begins] if turned.begins >= 0 else None,
-        rows_px=turned.rows_px,
-        depth_at_1_m_mm=turned.depth_at_1_m_m * 1e3,
-    )
 
 
 def _with_figures(told: CalibrationResult, found: Calibration) -> CalibrationResult:
@@ -324,7 +308,10 @@ def _with_figures(told: CalibrationResult, found: Calibration) -> CalibrationRes
     rectified_size = None if rectified is None else f"{rectified.width_px}x{rectified.height_px}"
     return replace(
         told,
-        views=tuple(_view(used, is_rectified=found.obstacle is None) for used in found.used),
+        views=tuple(
+            made(ViewErrors, used, vertical_px=used.vertical_px if found.obstacle is None else math.nan)
+            for used in found.used
+        ),
         rms_px=RmsErrors(rig.rms_left_px, rig.rms_right_px, rig.rms_stereo_px),
         vertical_error_px=VerticalError(float(px.mean()), float(np.percentile(px, 95)), float(px.max())),
         baseline_mm=_baseline_mm(rig),
@@ -334,11 +321,7 @@ def _with_figures(told: CalibrationResult, found: Calibration) -> CalibrationRes
         sizes={**{side: _size(model) for side, model in _cameras(rig)}, "rectified": rectified_size},
         board_side=rig.board_side.value,
         lens={
-            side: LensChosen(
-                bend.lens.value,
-                bend.terms,
-                tuple(LensTried(each.bend.lens.value, each.bend.terms, each.rms_px) for each in trials),
-            )
+            side: LensChosen(bend.lens.value, bend.terms, made(LensTried, trials))
             for side, bend, trials in zip(_SIDES, found.bends, found.trials, strict=True)
         },
         distortion_coefficients=max(bend.terms for bend in found.bends),
@@ -348,13 +331,6 @@ def _with_figures(told: CalibrationResult, found: Calibration) -> CalibrationRes
         board_spread=found.spread,
         largest_tilt_deg=float(found.tilts_deg.max()),
     )
-
-
-def _view(used: Used, *, is_rectified: bool) -> ViewErrors:
-    board = used.in_space
-    bow_mm, sigma_mm = (each * 1e3 for each in board.bow_m)
-    errors = (used.left_px, used.right_px, used.vertical_px if is_rectified else math.nan)
-    return ViewErrors(used.name, *errors, board.miss, board.size, board.size_sigma, bow_mm, sigma_mm)
 
 
 def _cameras(rig: Rig) -> tuple[tuple[str, CameraModel], ...]:

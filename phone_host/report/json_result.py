@@ -47,7 +47,7 @@ class FieldOf(Generic[S]):
         return cast("V", field(metadata={"read": read}))
 
 
-def made(kind: type, source: Any, *parts: Any, **given: Any) -> Any:  # noqa: ANN401 - stands in a field of any type
+def made(kind: type, source: Any, /, *parts: Any, **given: Any) -> Any:  # noqa: ANN401 - stands in a field of any type
     """Make a result of what it is read from; of None none, of several as many.
 
     Args:
