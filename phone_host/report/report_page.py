@@ -62,14 +62,7 @@ class Headline(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One key number.
-
-    Attributes:
-        label: what it is.
-        value: as text.
-        unit: its unit, may be empty.
-        note: a short explanation below it, may be empty.
-    """
+    """One key number as text, and a short explanation below it; unit and explanation may be empty."""
 
     label: str
     value: str
@@ -135,19 +128,13 @@ class PageData:
     """Everything on a page.
 
     Attributes:
-        title: title of the run.
         subtitle: when, where, how long; may be empty.
-        verdict: how it went.
-        sentence: the verdict in words.
         figures: key figures, most important first.
         pictures: left, right, disparity.
         delays: of all pairs.
         tables: drops by reason and similar.
-        notes: what to know, one sentence each.
-        steps: what to do next, one sentence each.
-        commands: what to type next.
+        notes: what to know, one sentence each; `steps`: what to do next.
         depth: the last pair's card, HTML with parts of `depth_view`, shown before the pictures; may be empty.
-        files: beside the page.
     """
 
     title: str

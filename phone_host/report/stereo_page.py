@@ -33,16 +33,9 @@ class StereoPageData:
     """Everything on the page of a stereo result.
 
     Attributes:
-        title: for example the names of the two images.
-        subtitle: when, from which files; may be empty.
-        verdict: how the result was judged.
-        sentence: whether the depth is right and how far it can be trusted.
-        processed: pair, disparity, cloud, geometry, limits and counts.
         captions: what the left and the right picture are.
         settings: matcher and settings, names and values.
         times: stages and how long each took, ns, in order.
-        files: beside the page.
-        commands: what to do next.
         notes: warnings and advice, one sentence each.
         back: relative link to the page of all pairs; empty: none.
     """
@@ -70,8 +63,6 @@ class PairEntry:
         name: the names of the two images.
         thumbnail: from `thumbnail`; None if there is none.
         density: share of the pixels with a depth; NaN = no result.
-        verdict: of this pair.
-        sentence: of this pair.
     """
 
     folder: str
@@ -84,18 +75,7 @@ class PairEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StereoIndexData:
-    """Everything on the page of several pairs.
-
-    Attributes:
-        title: its title.
-        subtitle: when, from which folders; may be empty.
-        verdict: of all pairs together.
-        sentence: the verdict in words.
-        pairs: in order.
-        files: beside the page.
-        commands: what to do next.
-        notes: what the user must know about all of them.
-    """
+    """Everything on the page of several pairs."""
 
     title: str
     subtitle: str
