@@ -214,10 +214,9 @@ def _of_model(of_pairs: Sequence[tuple[str, Diagnostic]], fused: Collection[str]
         of_pairs: names of pairs, and the doubt; at least one.
         fused: names of the pairs in the model.
     """
-    of_fused = [doubt for name, doubt in of_pairs if name in fused]
-    name, doubt = of_pairs[0]
-    if of_fused or not fused:
-        return of_fused[0] if of_fused else doubt
+    name, doubt = next((each for each in of_pairs if each[0] in fused), of_pairs[0])
+    if name in fused or not fused:
+        return doubt
     return replace(
         doubt, message=f"pair {name}: {doubt.message}", severity=Severity.WARN if doubt.is_failure else doubt.severity
     )
