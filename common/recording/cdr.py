@@ -97,14 +97,6 @@ class CdrReader:
         except UnicodeDecodeError as error:
             raise BrokenMessageError("a text is not UTF-8") from error
 
-    def doubles(self, count: int | None = None) -> tuple[float, ...]:
-        """Return 64-bit numbers: so many, or a sequence that says its length."""
-        length = int(self.number("I")) if count is None else count
-        if not length:
-            return ()
-        self._at += -(self._at - len(HEADER)) % 8
-        return struct.unpack(f"{self._order}{length}d", self._take(8 * length))
-
     def data(self) -> memoryview:
         """Return a sequence of bytes, as a view of the message."""
         return self._take(int(self.number("I")))

@@ -280,28 +280,6 @@ def camera_info_message(info: CameraInfo) -> bytes:
     return writer.done()
 
 
-def read_camera_info(data: "bytes | memoryview") -> CameraInfo:
-    """Read what is known of a camera.
-
-    Raises:
-        BrokenMessageError: it is no such message.
-    """
-    reader = CdrReader(data)
-    stamp_ns, frame_id = _read_header(reader)
-    height, width = int(reader.number("I")), int(reader.number("I"))
-    model = reader.text()
-    return CameraInfo(
-        stamp_ns=stamp_ns,
-        frame_id=frame_id,
-        size_px=(width, height),
-        model=model,
-        distortion=reader.doubles(),
-        matrix=reader.doubles(9),
-        rotation=reader.doubles(9),
-        projection=reader.doubles(12),
-    )
-
-
 def _write_raw(writer: CdrWriter, size_px: tuple[int, int], encoding: str, bytes_per_column: int) -> None:
     """Write what stands between the header and the data of an image that is not encoded."""
     width, height = size_px

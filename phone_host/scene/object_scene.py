@@ -37,8 +37,6 @@ from phone_host.scene.scene_model import (
 from phone_host.scene.scene_render import render
 from phone_host.scene.solid import OBJECTS, Solid
 
-OBJECT_NAMES: Final = tuple(OBJECTS)
-
 MAT: Final = MarkedBoard(Chessboard(10, 8, 25.0), 18.0, MarkFamily.ARUCO_5X5)
 """The mat that `target mat` prints."""
 
@@ -198,16 +196,6 @@ def mat_body(board: MarkedBoard = MAT, paper: Paper = Paper.A4) -> Body:
     sheet = marked_sheet(board, paper, "mat", "")
     width, height = sheet.width_mm / 1000.0, sheet.height_mm / 1000.0
     return Body("mat", Plane(width, height), (0.0, 0.0, 0.0), printed_sheet(sheet))
-
-
-def mat_corners_m(board: MarkedBoard = MAT) -> NDArray[np.float64]:
-    """Return the chessboard corners, row by row as they are numbered, (N, 3) float64 in the mat's axes."""
-    squares = board.squares
-    side = squares.square_mm / 1000.0
-    x = (np.arange(1, squares.columns) - squares.columns / 2.0) * side
-    y = (squares.rows / 2.0 - np.arange(1, squares.rows)) * side
-    across, down = np.meshgrid(x, y)
-    return np.stack([across.ravel(), down.ravel(), np.zeros(across.size)], axis=1)
 
 
 def object_rig(size: Size) -> Rig:

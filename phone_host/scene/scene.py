@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from phone_host.model import CameraModel, Rig, StereoGeometry
+from phone_host.model import CameraModel, Rig
 from phone_host.scene.cast import FACES, cast, pixel_rays, project, rays_through
 from phone_host.scene.scene_model import (
     Body,
@@ -157,11 +157,6 @@ def matched_rig() -> Rig:
     return Rig(left=model, right=model, R_right_left=np.eye(3), t_right_left_m=np.array([-BASELINE_M, 0.0, 0.0]))
 
 
-def matched_view() -> RectifiedView:
-    """Return the rectified view of `matched_rig`: its own left camera."""
-    return RectifiedView(StereoGeometry(focal_px=FOCAL_PX, baseline_m=BASELINE_M, cx_px=319.5, cy_px=239.5), 640, 480)
-
-
 def unlike_rig() -> Rig:
     """Return the demo's two cameras: a 640x480 webcam with barrel distortion on the left, an 800x600 phone on the right.
 
@@ -187,21 +182,6 @@ def unlike_rig() -> Rig:
 
 WEBCAM_LOOK = Look(gain_bgr=(0.95, 0.97, 1.02), offset=4.0, gamma=2.0, vignetting=0.25, noise_sigma=1.2, seed=1)
 PHONE_LOOK = Look(gain_bgr=(1.06, 1.04, 1.0), offset=0.0, gamma=2.0, vignetting=0.1, noise_sigma=0.8, seed=2)
-
-
-def plane_scene(depth_m: float, tilt_rad: float = 0.0, seed: int = 0) -> Scene:
-    """Return a scene of one infinite textured plane through (0, 0, depth), turned about the vertical axis by `tilt_rad`.
-
-    Args:
-        depth_m: its distance along the left camera's axis.
-        tilt_rad: 0 faces the camera.
-        seed: selects the texture.
-
-    Returns:
-        A still scene.
-    """
-    turn = rotation((0.0, 1.0, 0.0), tilt_rad)
-    return Scene((Body("plane", Plane(), (0.0, 0.0, depth_m), Texture(seed=seed), turn),))
 
 
 def demo_scene() -> Scene:

@@ -163,23 +163,6 @@ def open_image(path: Path, most_pixels: int = MOST_PIXELS, mounted: Orientation 
     return replace(examine(content, str(path), most_pixels), mounted=mounted)
 
 
-def read_image(path: Path, most_pixels: int = MOST_PIXELS, mounted: Orientation = UPRIGHT) -> Image:
-    """Read an image file as 8-bit grey or BGR.
-
-    Args:
-        path: the file.
-        most_pixels: an image that claims more is refused.
-        mounted: how its camera is mounted; applied after what the file's header says.
-
-    Returns:
-        (H, W) grey or (H, W, 3) BGR, uint8; alpha is dropped.
-
-    Raises:
-        DataError: the file is missing, empty, spoiled, of no known kind or beyond the limit.
-    """
-    return decode_file(open_image(path, most_pixels, mounted))
-
-
 def require_same_size(left_px: tuple[int, int], right_px: tuple[int, int], left_name: str, right_name: str) -> None:
     """Check that two images can be a rectified pair.
 

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from phone_host.model import Crop, PlaneQuality, Processed, Seen
-from phone_host.scene.scene import plane_scene, truth, unlike_rig
+from phone_host.scene.scene import truth, unlike_rig
 from phone_host.scene.scene_model import Look, RectifiedView, Scene, rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
@@ -31,6 +31,7 @@ from phone_host.stereo.reproject import disparities_for_near
 from tests.bench.drawn_rigs import Floats
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
+from tests.support.plain_scenes import plane_scene
 
 _DISTANCES_M: Final = (0.5, 1.0, 2.0)
 _TILTS_DEG: Final = (0.0, 20.0)

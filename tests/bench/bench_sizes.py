@@ -33,12 +33,13 @@ from rich.table import Table
 
 from phone_host.model import CameraModel, Image
 from phone_host.output.rig_yaml import write_rig
-from phone_host.scene.scene import demo_scene, matched_rig, matched_view, rectified_cameras, truth
+from phone_host.scene.scene import demo_scene, matched_rig, rectified_cameras, truth
 from phone_host.scene.scene_model import Look, Pose, RectifiedView, Scene
 from phone_host.scene.scene_render import render
 from phone_host.stereo.rectify import rectify_rig
 from tests.bench.figures import Verdict, exit_code
 from tests.bench.machine import machine
+from tests.support.plain_scenes import matched_view
 from tests.support.point_files import read_pfm
 
 SIZES_PX: Final = ((640, 480), (1632, 1224), (4000, 3000), (8160, 6120))

@@ -12,10 +12,11 @@ import pytest
 from common.recording.inflate import inflate
 from common.recording.mcap_records import Message
 from common.recording.opened import open_recorded, stored_data
-from common.recording.ros_messages import CAMERA_INFO, CameraInfo, camera_info_message, read_camera_info
+from common.recording.ros_messages import CAMERA_INFO, CameraInfo, camera_info_message
 from common.recording.salvage import Salvage
 from phone_host.cli import main
 from tests.support import foreign_recordings as other
+from tests.support.camera_infos import read_camera_info
 from tests.support.foreign_bags import BAGS, PAIRS, ros1_with_more
 from tests.support.foreign_recordings import COMPRESSED, Sent, picture
 from tests.support.measured_command import run_measured

@@ -13,7 +13,7 @@ import pytest
 
 from phone_host.calibration.target.corners import Board, find_corners
 from phone_host.output.rig_yaml import read_rig
-from phone_host.stereo.images import read_image
+from phone_host.stereo.images import decode_file, open_image
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.reproject import project
 from tests.support.boards import poses, render_pair
@@ -303,7 +303,7 @@ def test_squares_measured_in_the_cloud_have_their_size(tmp_path: Path) -> None:
     report = _calibrate_real("stereopi_rig/pairs/left*", "stereopi_rig/pairs/right*", "9x6", "25mm", rig_file)
     assert report["rms_px"]["stereo"] <= 0.25
     assert report["pairs"]["used"] >= 27
-    both = read_image(_scan_data() / "stereopi_rig" / "scenes" / "scene_640x240_1.png")
+    both = decode_file(open_image(_scan_data() / "stereopi_rig" / "scenes" / "scene_640x240_1.png"))
     cv2.imwrite(str(tmp_path / "l.png"), both[:, :320])
     cv2.imwrite(str(tmp_path / "r.png"), both[:, 320:])
     done = _phone_host(

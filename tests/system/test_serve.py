@@ -14,13 +14,13 @@ import pytest
 from common.keys import KeyFolder
 from phone_host.model import CameraModel, Rig
 from phone_host.output.rig_yaml import read_rig, write_rig
-from phone_host.scene.scene import plane_scene
 from phone_host.scene.scene_model import rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.board_films import board_films
 from tests.support.enrolment_rig import on_every_network
 from tests.support.page_client import page
+from tests.support.plain_scenes import plane_scene
 from tests.support.programs import board, host, ledgers, program, until
 from tests.support.rigs import small_rig
 

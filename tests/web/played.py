@@ -23,7 +23,7 @@ from phone_host.diagnostics.image_rules import ImageFigures
 from phone_host.diagnostics.run_snapshot import RecordingAccount
 from phone_host.model import Processed, Result
 from phone_host.scan.patches import Patches
-from phone_host.scene.scene import Truth, demo_scene, matched_view, rectified_cameras, truth
+from phone_host.scene.scene import Truth, demo_scene, rectified_cameras, truth
 from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
@@ -45,6 +45,7 @@ from phone_host.web.source import (
     StepName,
     Surface,
 )
+from tests.support.plain_scenes import matched_view
 from tests.support.run_snapshots import run as snapshot
 from tests.support.samples import LEDGER
 

@@ -13,12 +13,12 @@ from common.recording.opened import open_recorded
 from phone_host.model import CameraModel, Rig
 from phone_host.output.model_file import read_model
 from phone_host.output.rig_yaml import write_rig
-from phone_host.scene.scene import plane_scene
 from phone_host.scene.scene_model import rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.numbered import BITS, write_film
 from tests.support.page_client import PageClient, page
+from tests.support.plain_scenes import plane_scene
 from tests.support.programs import board, until
 from tests.web.conftest import PHONE
 

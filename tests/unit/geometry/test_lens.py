@@ -21,7 +21,6 @@ from phone_host.geometry.lens import (
 from phone_host.model import CameraModel, Lens, Side
 from phone_host.scene.cast import project as scene_project
 from phone_host.scene.cast import rays_through as rays_of_scene
-from phone_host.scene.scene import plane_scene
 from phone_host.scene.scene_model import Pose, rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
@@ -30,6 +29,7 @@ from phone_host.stereo.evidence_points import ThroughRig
 from phone_host.stereo.match import MatchSettings
 from phone_host.stereo.rectifier import Rectifier
 from phone_host.stereo.rectify import rectify_points, rectify_rig
+from tests.support.plain_scenes import plane_scene
 from tests.support.rigs import fisheye_rig, points_seen_by_both
 
 _MATRIX = np.array([[410.0, 0, 322], [0, 408, 237], [0, 0, 1]])

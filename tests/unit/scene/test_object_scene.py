@@ -13,18 +13,17 @@ from phone_host.scene.distance import nearest_on
 from phone_host.scene.object_scene import (
     BASELINE_M,
     MAT,
-    OBJECT_NAMES,
     RING_M,
     Motion,
     ObjectScene,
     Setting,
     Size,
-    mat_corners_m,
     object_scene,
 )
 from phone_host.scene.scene_model import Body, Box, Frustum, Plane, Pose, Scene, Shape, Sphere, Texture, Torus, rotation
 from phone_host.scene.scene_render import render
-from phone_host.scene.solid import Solid, samples_of
+from phone_host.scene.solid import OBJECTS, Solid, samples_of
+from tests.support.plain_scenes import mat_corners_m
 
 ROUND = (Frustum(0.03, 0.01, 0.05), Frustum(0.02, 0.02, 0.04), Frustum(0.03, 0.0, 0.06), Torus(0.03, 0.008))
 SHAPES = (*ROUND, Sphere(0.03), Box((0.05, 0.03, 0.004)))
@@ -111,7 +110,7 @@ def test_rig_and_mat_move_alike_seen_from_the_mat() -> None:
         assert np.allclose(np.linalg.inv(mat_in_scene) @ left_in_scene, mat.pose(number), atol=1e-12)
 
 
-@pytest.mark.parametrize("name", OBJECT_NAMES)
+@pytest.mark.parametrize("name", OBJECTS)
 def test_what_a_ray_hits_is_on_the_surface(name: str) -> None:
     """Every point that a ray hits first has no distance from the surface, and half a millimetre before it, it is at most that far away."""
     solid = object_scene(name).solid
@@ -132,7 +131,7 @@ def test_what_a_ray_hits_is_on_the_surface(name: str) -> None:
         assert before.max() <= 0.0005 + 1e-12
 
 
-@pytest.mark.parametrize("name", OBJECT_NAMES)
+@pytest.mark.parametrize("name", OBJECTS)
 def test_the_distance_is_that_of_the_nearest_sample(name: str) -> None:
     """Inside and outside, the distance is that of the nearest of densely spread samples, within half of their spacing."""
     solid = object_scene(name).solid

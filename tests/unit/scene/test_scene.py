@@ -20,8 +20,6 @@ from phone_host.scene.scene import (
     PHONE_LOOK,
     WEBCAM_LOOK,
     demo_scene,
-    matched_view,
-    plane_scene,
     rectified_cameras,
     truth,
     unlike_rig,
@@ -43,6 +41,7 @@ from phone_host.scene.scene_model import (
 from phone_host.scene.scene_render import Renderer, render
 from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.rectifier import Rectifier
+from tests.support.plain_scenes import matched_view, plane_scene
 from tests.support.rigs import narrow_rig, small_rig
 
 SMALL_VIEW = RectifiedView(StereoGeometry(focal_px=200.0, baseline_m=0.1, cx_px=79.5, cy_px=59.5), 160, 120)

@@ -13,10 +13,10 @@ from common.errors import DataError
 from phone_host.stereo.eight_bit import to_8_bit
 from phone_host.stereo.images import (
     decode,
+    decode_file,
     decode_files,
     examine,
     open_image,
-    read_image,
     require_same_size,
 )
 
@@ -37,7 +37,7 @@ def test_grey_files_keep_their_values(tmp_path: Path, suffix: str) -> None:
     """A lossless grey file comes back as (H, W) with the same values."""
     path = tmp_path / f"a{suffix}"
     cv2.imwrite(str(path), _RAMP)
-    np.testing.assert_array_equal(read_image(path), _RAMP)
+    np.testing.assert_array_equal(decode_file(open_image(path)), _RAMP)
 
 
 def test_colour_stays_bgr_and_alpha_is_dropped() -> None:
@@ -147,12 +147,12 @@ def test_any_bytes_give_an_image_or_a_data_error(content: bytes, head: bytes) ->
 def test_missing_and_empty_files_are_named(tmp_path: Path) -> None:
     """The message names the file."""
     with pytest.raises(DataError, match=r"none\.png cannot be read"):
-        read_image(tmp_path / "none.png")
+        decode_file(open_image(tmp_path / "none.png"))
     (tmp_path / "empty.png").touch()
     with pytest.raises(DataError, match=r"empty\.png is empty"):
-        read_image(tmp_path / "empty.png")
+        decode_file(open_image(tmp_path / "empty.png"))
     with pytest.raises(DataError, match="is a folder"):
-        read_image(tmp_path)
+        decode_file(open_image(tmp_path))
 
 
 def test_two_sizes_are_no_rectified_pair() -> None:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from phone_host.model import Image, RectifiedPair
-from phone_host.scene.scene import Truth, demo_scene, matched_rig, matched_view, truth
+from phone_host.scene.scene import Truth, demo_scene, matched_rig, truth
 from phone_host.scene.scene_model import Body, Path, Scene, rig_poses
 from phone_host.scene.scene_render import Renderer
 from phone_host.stereo.interpolate import Interpolator
 from phone_host.stereo.match import MatchSettings, create_matcher
+from tests.support.plain_scenes import matched_view
 
 PERIOD_S = 1 / 30
 MOMENT_S = 0.4

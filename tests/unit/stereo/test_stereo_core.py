@@ -8,7 +8,7 @@ import pytest
 
 from common.errors import DataError, SettingsError
 from phone_host.model import Crop, CutCounts, Epipolar, Image, RectifiedPair, Rig, Search, StereoGeometry
-from phone_host.scene.scene import matched_rig, plane_scene
+from phone_host.scene.scene import matched_rig
 from phone_host.scene.scene_model import rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
@@ -17,6 +17,7 @@ from phone_host.stereo.match import MatchSettings, create_matcher
 from phone_host.stereo.matcher_names import MatcherName
 from phone_host.stereo.matcher_protocol import check_pair, grey
 from phone_host.stereo.rectifier import Rectifier
+from tests.support.plain_scenes import plane_scene
 from tests.support.planes import noise
 from tests.support.rigs import unlike_rig
 

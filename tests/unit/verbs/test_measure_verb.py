@@ -14,11 +14,11 @@ from phone_host.cli import main
 from phone_host.model import RIG_PARAMETERS, Rig, Verdict
 from phone_host.output.rig_yaml import write_rig
 from phone_host.scene.cast import cast, rays_through
-from phone_host.scene.scene import plane_scene
 from phone_host.scene.scene_model import Look, rig_poses
 from phone_host.scene.scene_render import render
 from phone_host.stereo.rectify import rectify_rig
 from tests.support.overlays import write_turned
+from tests.support.plain_scenes import plane_scene
 from tests.support.rigs import small_rig
 from tests.unit.report.test_report_keys import described_words, keys_of
 

@@ -15,7 +15,7 @@ from phone_host.cli import main
 from phone_host.output.rig_yaml import write_rig
 from phone_host.run.file_pairs import FilePairs
 from phone_host.run.quality_job import QualityJob, run_quality
-from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK, plane_scene
+from phone_host.scene.scene import PHONE_LOOK, WEBCAM_LOOK
 from phone_host.scene.scene_model import Body, Box, Scene, Texture, rig_poses, rotation
 from phone_host.scene.scene_render import render
 from phone_host.stereo.core import StereoCore
@@ -27,6 +27,7 @@ from phone_host.stereo.view_files import pair_files
 from tests.support.boards import BOARD, render_pair
 from tests.support.html import Page
 from tests.support.overlays import write_turned
+from tests.support.plain_scenes import plane_scene
 from tests.support.rigs import narrow_rig, project_points
 
 NEAR_M, FAR_M = 0.6, 1.2

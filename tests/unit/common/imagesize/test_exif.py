@@ -16,7 +16,7 @@ from common.imagesize.read import read_head
 from common.imagesize.tiff import exif_orientation
 from common.orientation import UPRIGHT, Flip, Orientation
 from phone_host.model import Image
-from phone_host.stereo.images import decode, open_image, read_image
+from phone_host.stereo.images import decode, decode_file, open_image
 from phone_host.stereo.raw_images import EncodedImage, decode_frames
 from tests.support.oriented import SUFFIXES, exif, oriented
 from tests.support.pictures import encoded, picture
@@ -80,7 +80,7 @@ def test_files_and_frames_are_turned_alike(tmp_path: Path) -> None:
     )
     left, right = decode_frames(frame, frame, plan=plan)
     assert checked == [((32, 48), (32, 48))]
-    np.testing.assert_array_equal(left, read_image(tmp_path / "a.jpg"))
+    np.testing.assert_array_equal(left, decode_file(open_image(tmp_path / "a.jpg")))
     np.testing.assert_array_equal(right, left)
 
 
@@ -103,7 +103,7 @@ def test_what_the_user_says_of_a_camera_comes_after_its_header(tmp_path: Path) -
     mounted = Orientation(90, Flip.H)
     assert open_image(tmp_path / "a.png", mounted=mounted).size_px == (48, 32)
     expected = picture(48, 32)[::-1, ::-1][:, ::-1]
-    np.testing.assert_array_equal(read_image(tmp_path / "a.png", mounted=mounted), expected)
+    np.testing.assert_array_equal(decode_file(open_image(tmp_path / "a.png", mounted=mounted)), expected)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -168,7 +168,7 @@ def test_phone_formats_are_refused_with_the_way_to_convert_them(tmp_path: Path, 
     """HEIC and AVIF are named, and so is a command that converts them."""
     (tmp_path / "photo").write_bytes(struct.pack(">I4s4sI", 24, b"ftyp", brand, 0) + b"mif1heic" + b"\0" * 400)
     with pytest.raises(DataError, match=f"is a {kind} image, which is not read: convert it to JPEG.*magick"):
-        read_image(tmp_path / "photo")
+        decode_file(open_image(tmp_path / "photo"))
 
 
 def test_a_raw_photograph_is_refused() -> None:

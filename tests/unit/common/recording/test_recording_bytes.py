@@ -22,10 +22,10 @@ from common.recording.ros_messages import (
     depth_parts,
     image_message,
     image_type,
-    read_camera_info,
     read_image,
 )
 from common.recording.salvage import Salvage, is_mcap
+from tests.support.camera_infos import read_camera_info
 from tests.support.recorded import recording
 
 PAIRS = 24
