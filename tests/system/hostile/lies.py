@@ -37,7 +37,7 @@ _MOST: Final = 2**53
 _FLOOD_S: Final = 2.0
 _WAVE: Final = 3
 _KNOWN_S: Final = 11.0
-"""Longer than the clock counts as young (host_path.py)."""
+"""Longer than the clock counts as young (waves.py)."""
 
 _MOST_BYTES: Final = 6 * 2**30
 """The host gets no more address space than this, so that a bomb that goes off spoils a test and not the machine."""
