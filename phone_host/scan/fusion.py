@@ -14,7 +14,7 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import StereoGeometry
 from phone_host.scan.blocks import Cells
 from phone_host.scan.carving import Carved, Carving
-from phone_host.scan.surface_error import FusedDepths, Texture, texture_of
+from phone_host.scan.surface_error import FusedView
 from phone_host.scan.view import View, narrowed
 
 _WIDTH_PX: Final = 160
@@ -31,7 +31,6 @@ class _Kept:
     geometry: StereoGeometry
     noise_px: float
     world_camera: SE3
-    texture: Texture
 
     @property
     def view(self) -> View:
@@ -78,10 +77,10 @@ class KeptDepths:
         ]
 
     @property
-    def fused(self) -> list[FusedDepths]:
+    def fused(self) -> list[FusedView]:
         """The depths of the views in the model, in the order in which they were taken."""
         ordered = sorted(self._kept, key=lambda each: each.number)
-        return [FusedDepths(each.view, each.world_camera, each.texture) for each in ordered]
+        return [(each.view, each.world_camera) for each in ordered]
 
     def _is_next(self) -> bool:
         self._seen += 1
@@ -102,7 +101,7 @@ def _small(number: int, view: View, world_camera: SE3) -> _Kept:
     depth, geometry, step = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
     with np.errstate(over="ignore"):
         small = depth.astype(np.float16)
-    return _Kept(number, small, geometry, view.noise_px / step, world_camera, texture_of(view.grey, depth.shape))
+    return _Kept(number, small, geometry, view.noise_px / step, world_camera)
 
 
 class Fusion:

@@ -18,7 +18,7 @@ from phone_host.scan.piece import PoseGate
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair, Submap
 from phone_host.scan.stretches import Placed, WayCertainty
-from phone_host.scan.surface_error import FusedDepths, PoseErrors
+from phone_host.scan.surface_error import FusedView, PoseErrors
 from phone_host.scan.table import Table, find_table
 from phone_host.scan.tracked import Tracked, lost
 from phone_host.scan.tracker import Tracker, TrackerState
@@ -89,7 +89,7 @@ class PoseSource(ABC):
         del number
         return pair
 
-    def fused_views(self, kept: Sequence[FusedDepths]) -> Sequence[FusedDepths] | None:
+    def fused_views(self, kept: Sequence[FusedView]) -> Sequence[FusedView] | None:
         """Return the depths by which the surface's error is judged; None: those of a part of it are missing."""
         return kept
 
@@ -142,7 +142,7 @@ class VisualPoses(PoseSource):
         """See `PoseSource.settle`: loops move the model."""
         return () if self.tracker is None else self._numbered(self.tracker.settled())
 
-    def fused_views(self, kept: Sequence[FusedDepths]) -> Sequence[FusedDepths] | None:
+    def fused_views(self, kept: Sequence[FusedView]) -> Sequence[FusedView] | None:
         """See `PoseSource.fused_views`: without the views before a resumption the others cannot show the drift."""
         return None if self._is_resumed else kept
 

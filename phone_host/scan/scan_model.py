@@ -14,7 +14,7 @@ from phone_host.scan.carving import Carving
 from phone_host.scan.closing import Floor, closed
 from phone_host.scan.ground import Ground
 from phone_host.scan.mesh import Flags, Mesh, mesh_of, only, part_of, pieces_of, without_crumbs, without_loose_bodies
-from phone_host.scan.surface_error import ErrorScope, FusedDepths, PoseErrors, surface_error
+from phone_host.scan.surface_error import ErrorScope, FusedView, PoseErrors, surface_error
 from phone_host.scan.volume import Volume
 from phone_host.scan.volume_settings import LEAST_WEIGHT, WEIGHT_ONE, VolumeSettings
 
@@ -66,7 +66,7 @@ class ScanModel:
         is_closed = choice is not UnseenSurface.CUT
         return replace(self, mesh=rest, noise_m=self.noise_m[used], seen=self.seen[used], is_closed=is_closed)
 
-    def judged(self, volume: Volume, views: Sequence[FusedDepths], pose_errors: PoseErrors) -> "ScanModel":
+    def judged(self, volume: Volume, views: Sequence[FusedView], pose_errors: PoseErrors) -> "ScanModel":
         """Return the model with the standard deviations that the views' agreement asks for: see `surface_error`."""
         noise_m, scope = surface_error(volume, views, self.mesh.points_m, self.noise_m, pose_errors)
         return replace(self, noise_m=noise_m, error_scope=scope)

@@ -8,24 +8,21 @@ Source: J. M. Flegal and G. L. Jones, "Batch means and spectral variance estimat
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from enum import Enum
-from types import MappingProxyType
 from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from phone_host.geometry.se3 import SE3, vectors_of
-from phone_host.model import Image
 from phone_host.scan.blocks import SIDE
 from phone_host.scan.view import Camera, View, narrowed
 from phone_host.scan.volume import Volume
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.int64]
-Texture = NDArray[np.float16]
+FusedView = tuple[View, SE3]
+"""One that became part of the model, of which only the depths count, and where it was taken."""
 
 
 class ErrorScope(Enum):
@@ -64,17 +61,15 @@ _LEAST_COVERED: Final = 0.5
 """Share of the points on pieces that two segments or more have seen."""
 
 _DRIFT: Final = 1.1
-"""Error of the mean of all segments as a multiple of what their spread tells: neighbours err together, too. This and the next two were fitted together to
-rendered sequences; decision 0140 has them, and others that were only tested."""
+"""Error of the mean of all segments as a multiple of what their spread tells: neighbours err together, too. This and the next ones were fitted together to
+rendered sequences; decision 0147 has them, and others that were only tested."""
 
-_BIAS: Final = MappingProxyType({PoseErrors.DRIFT: 0.3, PoseErrors.INDEPENDENT: 0.2})
-"""Error that all views share, by the matcher, which no spread shows, as a share of a depth's noise: 0.15 px of a disparity. On a mat, whose poses are
-independent, both images were laid onto each other again (`mat_tracker.with_exact_depths`): 0.10 px."""
+_EVEN, _BENT = 0.2, 0.5
+"""Error that all views share, by the matcher, which no spread shows, as a share of a depth's noise, 0.5 px: that of an even piece, and what comes on top where
+it is bent, as a matcher smooths edges and curves. On a mat both images were laid onto each other again (`mat_tracker.with_exact_depths`): nothing comes on top."""
 
-_TEXTURE, _MAX_BLURRED = 4.8, 3.0
-"""Grey levels a pixel: where an image changes by less, the variance of that error grows in proportion, up to so many times. Not on a mat."""
-
-_FLAT: Final = 0.01
+_BENT_RAD: Final = 0.3
+"""Spread of the normals of a piece, root mean square, from which on it is bent; below, in proportion."""
 
 _UNSHOWN: Final = 2.0
 """Variance where no two segments saw the surface, as a multiple of the mean elsewhere: errors there were 1.2 times as large or more on rendered things."""
@@ -91,46 +86,9 @@ _FAR: Final = 1 << 16
 """Pieces to either side of the origin: half a kilometre with voxels of 1 mm."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FusedDepths:
-    """Depths that became part of the model.
-
-    Attributes:
-        view: with them; its images do not count.
-        world_camera: where it was taken.
-        texture: (H, W) float16, how much the image changes along a row there, grey levels a pixel.
-    """
-
-    view: View
-    world_camera: SE3
-    texture: Texture
-
-    @staticmethod
-    def of(view: View, world_camera: SE3) -> "FusedDepths":
-        """Return those of a view, in a size that is quick to compare."""
-        depth, geometry, step = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
-        small = replace(view, depth_m=depth, geometry=geometry, noise_px=view.noise_px / step)
-        return FusedDepths(small, world_camera, texture_of(view.grey, depth.shape))
-
-
-def texture_of(grey: Image, shape: tuple[int, ...]) -> Texture:
-    """Return how much an image (H, W) changes along a row, grey levels a pixel, averaged to a smaller shape."""
-    slope = np.abs(np.gradient(grey.astype(np.float32), axis=1)).astype(np.float32)
-    return np.asarray(cv2.resize(slope, (shape[1], shape[0]), interpolation=cv2.INTER_AREA), np.float16)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Distances:
-    """What the segments of a path saw: (M,) numbers of pieces, the mean distance of the depths from the surface there, m, and the mean square of the errors that all views share, m^2."""
-
-    pieces: Numbers
-    means_m: Floats
-    biases_m2: Floats
-
-
 def surface_error(
     volume: Volume,
-    views: Sequence[FusedDepths],
+    views: Sequence[FusedView],
     points_m: NDArray[np.float32],
     noise_m: NDArray[np.float32],
     pose_errors: PoseErrors,
@@ -153,11 +111,16 @@ def surface_error(
     count = int(segments[-1]) + 1 if len(segments) else 0
     if len(views) < _LEAST_VIEWS or count < _LEAST_SEGMENTS or not len(points_m):
         return noise_m, ErrorScope.NOISE
-    seen = _distances(volume, views, segments, pose_errors)
-    pieces, at = np.unique(seen.pieces, return_inverse=True)
+    seen, pixels, sums = _seen(volume, views, segments)
+    enough = pixels >= _MIN_PIXELS
+    pieces, at = np.unique(seen[enough] >> 7, return_inverse=True)
+    off_m, *of_segments = sums[:, enough] / pixels[enough]
     times = np.bincount(at, minlength=len(pieces))
-    means, biases = (np.bincount(at, of) / times for of in (seen.means_m, seen.biases_m2))
-    spreads = np.bincount(at, (seen.means_m - means[at]) ** 2) / np.maximum(times - 1, 1) / times
+    means_m, noise_m2, *normals = (np.bincount(at, each) / times for each in (off_m, *of_segments))
+    spreads = np.bincount(at, (off_m - means_m[at]) ** 2) / np.maximum(times - 1, 1) / times
+    bends = np.clip((1 - np.square(normals).sum(axis=0)) / _BENT_RAD**2, 0, 1)
+    smoothed = _BENT**2 * bends * (pose_errors is not PoseErrors.INDEPENDENT)
+    variances_m2 = _DRIFT**2 * spreads + (_EVEN**2 + smoothed) * noise_m2
     known = np.isfinite(noise_m)
     of_point = _pieces(points_m[known].astype(np.float64), volume)
     place = np.minimum(np.searchsorted(pieces, of_point), max(len(pieces) - 1, 0))
@@ -166,21 +129,19 @@ def surface_error(
         return noise_m, ErrorScope.NOISE
     if pose_errors is not PoseErrors.INDEPENDENT and times[place[covered]].mean() < _LEAST_SHARE * count:
         return noise_m, ErrorScope.NOISE
-    # Few segments tell a spread badly: half of it is the mean of all.
-    spread = (spreads[place] + spreads[place[covered]].mean()) / 2
-    variances = np.where(covered, _DRIFT**2 * spread + biases[place], 0)
-    variances[~covered] = _UNSHOWN * variances[covered].mean()
+    mean_m2 = variances_m2[place[covered]].mean()
     error_m = np.full(noise_m.shape, np.nan, np.float32)
-    error_m[known] = np.sqrt(variances)
+    # Few segments tell a spread badly: half of it is the mean of all.
+    error_m[known] = np.sqrt(np.where(covered, (variances_m2[place] + mean_m2) / 2, _UNSHOWN * mean_m2))
     return error_m, ErrorScope.DRIFT
 
 
-def _segments(views: Sequence[FusedDepths]) -> Numbers:
+def _segments(views: Sequence[FusedView]) -> Numbers:
     """Return the number of the segment to which each view belongs, (N,), from 0 on without gaps."""
     path, numbers = 0.0, [0] * len(views)
     for at in range(1, len(views)):
-        step = views[at - 1].world_camera.inverse() @ views[at].world_camera
-        depth = views[at].view.depth_m
+        step = views[at - 1][1].inverse() @ views[at][1]
+        depth = views[at][0].depth_m
         depth = depth[np.isfinite(depth)]
         away_m = float(np.median(depth)) if depth.size else np.inf
         path += max(float(np.linalg.norm(vectors_of(step.R))), float(np.linalg.norm(step.t_m)) / away_m)
@@ -188,14 +149,17 @@ def _segments(views: Sequence[FusedDepths]) -> Numbers:
     return np.unique(numbers, return_inverse=True)[1].astype(np.int64)
 
 
-def _distances(volume: Volume, views: Sequence[FusedDepths], segments: Numbers, pose_errors: PoseErrors) -> _Distances:
-    """Compare the depths of views with the surface."""
-    most_m, bias = _MAX_VOXELS * volume.settings.voxel_m, _BIAS[pose_errors]
-    most_blurred = 1.0 if pose_errors is PoseErrors.INDEPENDENT else _MAX_BLURRED
+def _seen(volume: Volume, views: Sequence[FusedView], segments: Numbers) -> tuple[Numbers, Floats, Floats]:
+    """Compare the depths of views with the surface.
+
+    Returns:
+        (M,) number of a piece times 128 and that of a segment which saw it; (M,) how many pixels that is; (5, M) sums over them: the distance of the depth
+        from the surface, m, the variance of a depth along the normal, m^2, and the three parts of the normal.
+    """
+    most_m = _MAX_VOXELS * volume.settings.voxel_m
     keys, sums = list[Numbers](), list[Floats]()
-    for each, segment in zip(views, segments, strict=True):
-        view, pose, geometry = each.view, each.world_camera, each.view.geometry
-        depth = np.ascontiguousarray(view.depth_m, np.float32)
+    for (view, pose), segment in zip(views, segments, strict=True):
+        depth, geometry, _ = narrowed(view.depth_m, view.geometry, _WIDTH_PX)
         surface = volume.cast(Camera(geometry, depth.shape, pose), depth)
         rows, columns = np.indices(depth.shape, np.float32)
         seen_m = np.stack(
@@ -205,17 +169,15 @@ def _distances(volume: Volume, views: Sequence[FusedDepths], segments: Numbers, 
         near = np.abs(off_m) < most_m  # NaN is not
         key = (_pieces(pose.apply(surface.points_m[near].astype(np.float64)), volume) << 7) | segment
         found, at = np.unique(key, return_inverse=True)
-        blurred = np.clip(_TEXTURE / np.maximum(each.texture[near].astype(np.float64), _FLAT), 1, most_blurred)
+        normals = surface.normals[near].astype(np.float64)
         # Of a depth's error the part along the normal moves the surface.
-        along = np.abs((seen_m * surface.normals).sum(axis=-1))[near] / geometry.focal_px
-        bias_m = bias * view.noise_per_m * depth[near] * along.astype(np.float64)
-        of_pixel = np.ones(len(key)), off_m[near], blurred * bias_m**2
+        noise_m = view.noise_per_m * depth[near] * (seen_m[near] * normals).sum(axis=-1) / geometry.focal_px
+        of_pixel = np.ones(len(key)), off_m[near], noise_m**2, *(pose.R @ normals.T)
         keys.append(found)
         sums.append(np.array([np.bincount(at, each, len(found)) for each in of_pixel]))
     every, at = np.unique(np.concatenate(keys), return_inverse=True)
-    pixels, off, biases = (np.bincount(at, each, len(every)) for each in np.concatenate(sums, axis=1))
-    enough = pixels >= _MIN_PIXELS
-    return _Distances(every[enough] >> 7, off[enough] / pixels[enough], biases[enough] / pixels[enough])
+    totals = np.array([np.bincount(at, each, len(every)) for each in np.concatenate(sums, axis=1)], np.float64)
+    return every, totals[0], totals[1:]
 
 
 def _pieces(points_m: Floats, volume: Volume) -> Numbers:

@@ -29,7 +29,7 @@ from phone_host.scan.scan_model import ScanModel, closed_model, open_model
 from phone_host.scan.scan_wanted import ScanWanted
 from phone_host.scan.scanned import ScannedPair
 from phone_host.scan.stretches import Placed
-from phone_host.scan.surface_error import FusedDepths
+from phone_host.scan.surface_error import FusedView
 from phone_host.scan.surface_match import Match, SurfaceMatch, matched_surfaces
 from phone_host.scan.tracked import Tracked, lost
 from phone_host.scan.tracker import Tracker
@@ -192,14 +192,14 @@ class TurntablePoses(PoseSource):
         is_moved = self.fit.match is not None and pair.is_fused
         return replace(pair, world_camera=self.fit.model_own @ pair.world_camera) if is_moved else pair
 
-    def fused_views(self, kept: Sequence[FusedDepths]) -> Sequence[FusedDepths] | None:
+    def fused_views(self, kept: Sequence[FusedView]) -> Sequence[FusedView] | None:
         """See `PoseSource.fused_views`: those of the thing alone; if an earlier pass is part of the model, its views are not here."""
         del kept
         if self.fit.is_on_earlier_pass:
             return None
         used = [True] * self.views if self.fit.turn is None else self.fit.turn.used.tolist()
         return [
-            FusedDepths.of(each.thing, pose)
+            (each.thing, pose)
             for each, is_used in zip(self._keyframes, used, strict=True)
             if is_used and (pose := self._pose_of(each)) is not None
         ]

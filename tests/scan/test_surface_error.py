@@ -11,9 +11,11 @@ from phone_host.geometry.se3 import SE3
 from phone_host.model import Processed
 from phone_host.scan.mat import USUAL_MAT, parse_mat
 from phone_host.scan.scan import Scan, scan_for
-from phone_host.scan.scan_model import ScanModel
+from phone_host.scan.scan_model import ScanModel, open_model
 from phone_host.scan.scan_wanted import ScanWanted
-from phone_host.scan.surface_error import ErrorScope
+from phone_host.scan.surface_error import ErrorScope, PoseErrors
+from phone_host.scan.volume import Volume
+from phone_host.scan.volume_settings import VolumeSettings
 from phone_host.scene.object_scene import Setting
 from phone_host.stereo.core import StereoCore
 from phone_host.stereo.depth_limits import DepthWanted
@@ -24,6 +26,7 @@ from tests.bench.scan_error_objects import error_scene
 from tests.scan.test_scan_mat import WANTED as ON_MAT
 from tests.scan.test_scan_mat import walked
 from tests.support.mats import BALL_M
+from tests.support.plane_films import CORNER, plane_view, texture
 from tests.support.surface_coverage import Distance, coverage
 from tests.support.table_things import computed_view, small_scene, true_camera
 from tests.support.turning_things import Size, matched_view, off_thing_m, photographed, processed_of, turned_scene
@@ -116,6 +119,25 @@ def test_an_object_that_turns() -> None:
     model = scan.model()
     assert scan.fused == len(views)
     assert_stated_well(model, off_thing_m, SE3.identity())
+
+
+@pytest.mark.parametrize(
+    ("pose_errors", "least", "most"), [(PoseErrors.DRIFT, 1.4, 2.5), (PoseErrors.INDEPENDENT, 0.7, 1.3)]
+)
+def test_a_matcher_smooths_where_a_surface_bends(pose_errors: PoseErrors, least: float, most: float) -> None:
+    """So pieces on an edge are stated less exact than even ones; on a mat, where the images are laid onto each other again, they are not."""
+    turns = np.linspace(-0.8, 0.8, 10)
+    at = SE3(np.eye(3), np.array([0.0, 0.0, 1.0]))
+    poses = [at @ SE3.of(np.array([0.0, turn, 0.0, 0.0, 0.0, 0.0])) @ at.inverse() for turn in turns]
+    views = [plane_view(pose, texture(), CORNER) for pose in poses]
+    volume = Volume(VolumeSettings(voxel_m=0.02, far_m=3.0))
+    for view, pose in zip(views, poses, strict=True):
+        volume.fuse(view, pose)
+    model = open_model(volume).judged(volume, list(zip(views, poses, strict=True)), pose_errors)
+    apart = np.sort([np.abs((model.mesh.points_m - plane.through_m) @ plane.axes[0]) for plane in CORNER], axis=0)[1]
+    assert model.error_scope is ErrorScope.DRIFT
+    edges, even = (np.nanmedian(model.noise_m[chosen]) for chosen in (apart < 0.02, apart > 0.2))
+    assert least < edges / even < most
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])
