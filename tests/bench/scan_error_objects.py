@@ -52,7 +52,7 @@ def _bottle() -> Solid:
 
 
 def _rock() -> Solid:
-    """Edges, corners and a bulge. No constant was fitted to it."""
+    """Edges, corners and a bulge."""
     return Solid(
         (
             Body("slab", Box((0.07, 0.05, 0.04)), (0.0, 0.0, 0.02), _STONE, rotation((0.0, 0.0, 1.0), 0.4)),
