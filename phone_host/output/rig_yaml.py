@@ -7,7 +7,7 @@ absent: pinhole with 4 or 5 coefficients, rational with more); R T (right from l
 rms_right rms_stereo (px, .Nan = unknown); zero_sigma (standard uncertainty of the disparity of infinitely far points, px;
 absent or .Nan: not measured); verdict (good, usable, reject; absent: not stated); left_camera, right_camera (see
 `rig_cameras`); time_offset_ns, time_offset_uncertainty_ns (host's stamp minus board's;
-absent: not measured); how well all of it is known (see `rig_views`); views (see `rig_views`). This program reads only the rig and computes the rectification from it. R1 to Q are there for
+absent: not measured); how well all of it is known, and views (see `rig_views`). This program reads only the rig and computes the rectification from it. R1 to Q are there for
 other programs; a rig that they contradict is refused. Of a file from format 2 on nothing may be missing but verdict, cameras,
 uncertainties and views: one that was cut off would lose its verdict without a word.
 """

@@ -176,8 +176,7 @@ def run_stereo(
                     results.stage()
 
         def keep(done: Sequence[PairReport | FailedPair]) -> None:
-            so_far = replace(work.report(done), interrupted_of=count)
-            if count > 1 and so_far.computed:
+            if count > 1 and (so_far := replace(work.report(done), interrupted_of=count)).computed:
                 work.write(so_far)
                 if results.earlier:
                     pairs.tell_of_partial(results.keep_staged(), len(done))

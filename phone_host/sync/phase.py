@@ -55,6 +55,9 @@ _PATIENCE_NS: Final = 10_000 * _MS
 _TRIES: Final = 12
 """Most tries. On a loaded board starts scatter: by 20 ms, at 10 fps, six tries left one of nine simulated cameras out of step, twelve none of 60."""
 
+_NEWEST_MISSES: Final = 6
+"""The average is that of so many corrections."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
@@ -235,7 +238,7 @@ class PhaseController:
         self._deadline_ns = 2**63
         self._aligned_ns: int | None = None
         self._tries = self._corrections = 0
-        self._misses_ns: deque[float] = deque(maxlen=_TRIES)
+        self._misses_ns: deque[float] = deque(maxlen=_NEWEST_MISSES)
         self._before_ns = self._after_ns = math.nan
 
     @property

@@ -213,7 +213,7 @@ class Fit:
     """What some sightings together say.
 
     Attributes:
-        values: (4,) parameters as `rows` has them, then the lateness of the left image, s: (5,).
+        values: (4,) parameters in the order of the columns of `Rows`, then the lateness of the left image, s: (5,).
         covariance: (5, 5).
         features: how many count.
         share: of all features.
