@@ -66,7 +66,10 @@ def made(kind: type, source: Any, /, *parts: Any, **given: Any) -> Any:  # noqa:
         if "read" in each.metadata:
             given[each.name] = each.metadata["read"](source)
         elif each.default is MISSING:
-            given[each.name] = getattr(next(one for one in (source, *parts) if hasattr(one, each.name)), each.name)
+            holder = next((one for one in (source, *parts) if hasattr(one, each.name)), None)
+            if holder is None:
+                raise TypeError(f"{kind.__name__}.{each.name} can be read nowhere")
+            given[each.name] = getattr(holder, each.name)
     return kind(**given)
 
 

@@ -37,7 +37,10 @@ class PairReport:
         left: the left image file, as it was named; `right` likewise.
         left_px: size of the left image as matched or rectified from; `right_px` likewise.
         rectified_px: size of the rectified images, and so of the disparity.
+        match_report: what the matcher corrected before; None: not known.
         geometry: None: unknown, so there is no cloud.
+        limits: of the cloud; None without one.
+        cut: what became of the pixels; None: not counted.
         density: share of the pixels that have a disparity.
         stages_ms: how long each stage took, and `total`.
     """

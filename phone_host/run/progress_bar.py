@@ -27,7 +27,7 @@ from rich.table import Column
 from common.program.terminal import say
 
 _AGAIN_S: Final = 8.0
-"""Who reads a log learns so often that a stage still goes on."""
+"""Who reads a log learns so often that a stage still goes on: on a loaded machine, too, no ten seconds pass without a line."""
 
 _WIDE: Final = 76
 """Characters for the longest description (40), a bar and two numbers."""

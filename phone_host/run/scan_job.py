@@ -208,11 +208,11 @@ def finished_scan(
 
 
 def _of_model(of_pairs: Sequence[tuple[str, Diagnostic]], fused: Collection[str]) -> Diagnostic:
-    """Return a doubt about the images of pairs as one about the model: it is no failure, and names a pair, where none of these is in the model.
+    """Return a doubt about the images of pairs as one about the model: it is no failure, and names a pair, where other judged pairs are in the model and none of these.
 
     Args:
         of_pairs: names of pairs, and the doubt; at least one.
-        fused: names of the pairs in the model.
+        fused: names of the judged pairs in the model.
     """
     name, doubt = next((each for each in of_pairs if each[0] in fused), of_pairs[0])
     if name in fused or not fused:
@@ -248,14 +248,13 @@ def run_scan(
         )
     work = ScanWork(wanted, pairs.out, resumed, pairs.tell)
     doubts: dict[str, list[tuple[str, Diagnostic]]] = {}
-    is_judged = False
+    judged: set[str] = set()
 
     def take(pair: ComputedPair) -> ScannedPair:
-        nonlocal is_judged
         number, name = pair.number, pair.label
         # 0, 1, 2, 4, 8 ...: what is wrong with a rig is wrong with all of its pairs
-        if number & (number - 1) == 0 or not is_judged:
-            is_judged = True
+        if number & (number - 1) == 0 or not judged:
+            judged.add(name)
             for concern in judge_pair(pair.core, pair.processed, pairs.mounted).concerns:
                 doubts.setdefault(concern.code, []).append((name, as_remark(concern)))
         scanned = work.scan.take(name, float(name) if pairs.files.by_number else float(number), pair.processed)
@@ -264,7 +263,7 @@ def run_scan(
         return scanned
 
     def finished(done: Sequence[ScannedPair | FailedPair]) -> FinishedScan:
-        fused = {pair.name for pair in work.scan.pairs if pair.is_fused}
+        fused = {pair.name for pair in work.scan.pairs if pair.is_fused} & judged
         remarks = (*(_of_model(of_pairs, fused) for of_pairs in doubts.values()), *pairs.remarks)
         return work.finished(remarks, done, matcher=pairs.matcher, axes=axes)
 

@@ -41,18 +41,24 @@ def page_options(kind: type) -> dict[str, Option]:
     return {name: made for name, made in options_by_flag(kind).items() if made.page}
 
 
+def calibrate_options() -> dict[str, Option]:
+    """Return those of `calibrate` that the page may set beside what is chosen for a run."""
+    chosen = page_options(RunRequest).keys() - {"baseline", "out"}
+    return {name: made for name, made in page_options(CalibrateRequest).items() if name not in chosen}
+
+
 def value_schemas() -> dict[str, object]:
     """Return JSON schemas of the values that the page's commands of the same names take."""
-    kinds = {"set": RunRequest, "calibrate": CalibrateRequest, "scan": ModelOptions}
+    kinds = {"set": page_options(RunRequest), "calibrate": calibrate_options(), "scan": page_options(ModelOptions)}
     return {
         f"{do}_values": {
             "type": "object",
             "properties": {
                 name: {"type": "string", "description": made.declared["help"].replace("%%", "%")}
-                for name, made in page_options(kind).items()
+                for name, made in options.items()
             },
         }
-        for do, kind in kinds.items()
+        for do, options in kinds.items()
     }
 
 

@@ -38,7 +38,7 @@ from phone_host.run.sinks import Sink
 from phone_host.serve.choices import (
     Choices,
     asked_scan,
-    page_options,
+    calibrate_options,
     placed,
     request_of,
     shown_words,
@@ -253,7 +253,7 @@ class Commands:
             sinks: take its pairs.
         """
         given = {name: value for name, value in without_depth(choices).items() if name != "fifo"}
-        given |= {name: values[name] for name in page_options(CalibrateRequest) if values.get(name)}
+        given |= {name: values[name] for name in calibrate_options() if values.get(name)}
         given |= {name: value for name, value in self._fixed.items() if name == "keys"}
         given |= {"live": "yes", "out": placed(values.get("out", "")) or str(data_folder() / _RIG)}
         request = replace(request_of(given, CalibrateRequest, "calibrate"), sound=False)

@@ -14,7 +14,7 @@ from phone_host.serve.choices import Choices, given_by, options_by_flag, page_op
 from phone_host.settings import PAGE_TABLE
 
 _SETTINGS: Final = options_by_flag(PhoneHostSettings)
-_OF_PROGRAM: Final = _SETTINGS.keys() - page_options(PhoneHostSettings)
+_OF_PROGRAM: Final = tuple(name for name, made in _SETTINGS.items() if not made.page)
 """Settings that concern the program and not the page's choices. They stay as they are."""
 
 

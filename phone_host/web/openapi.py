@@ -28,7 +28,7 @@ _REFUSED: Final = (401, 403, 421, 429)
 _DO: Final = (
     "`record` begins a recording (MCAP) beside the run that goes on, in a new file of the folder `recordings`; `end_recording` ends it."
     " How it goes stands in the state: `live.recording`. `snapshot` saves the newest pair. `set`, `calibrate` and `scan` take as values the options"
-    " that the schema of their name lists, `enrol` link and code, `crop` box, `check_model` bed,"
+    " that the schemas `set_values`, `calibrate_values` and `scan_values` list (switches: yes or no), `enrol` link and code, `crop` box, `check_model` bed,"
     " `save_model` format, `prepare_print` printer and bed, `print` confirm: what `printing.asks` says; the others take none."
 )
 
