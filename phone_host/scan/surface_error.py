@@ -64,7 +64,7 @@ _DRIFT: Final = 1.1
 """Error of the mean of all segments as a multiple of what their spread tells: neighbours err together, too. This and the next ones were fitted together to
 rendered sequences; decision 0147 has them, and others that were only tested."""
 
-_EVEN, _BENT = 0.2, 0.5
+_EVEN, _BENT = 0.2, 0.45
 """Error that all views share, by the matcher, which no spread shows, as a share of a depth's noise, 0.5 px: that of an even piece, and what comes on top where
 it is bent, as a matcher smooths edges and curves. On a mat both images were laid onto each other again (`mat_tracker.with_exact_depths`): nothing comes on top."""
 
