@@ -45,12 +45,17 @@ def coverage(model: ScanModel, distance: Distance, start: SE3 | None, reach_m: f
         distance: returns how far points (N, 3), m, lie from the true surface, m.
         start: takes the model's points to the true axes, about; from there it is aligned rigidly. None: it is in the true axes.
         reach_m: points farther from the true vertical axis do not count.
+
+    Returns:
+        The comparison; NaN without any such point.
     """
     chosen = np.flatnonzero(model.seen & np.isfinite(model.noise_m))
     chosen = np.random.default_rng(0).permutation(chosen)
     points, sigma = model.mesh.points_m[chosen].astype(np.float64), model.noise_m[chosen].astype(np.float64)
     near = np.linalg.norm((points if start is None else start.apply(points))[:, :2], axis=1) < reach_m
     points, sigma = points[near][:_POINTS], sigma[near][:_POINTS]
+    if not len(points):
+        return Coverage(np.nan, np.nan, np.nan, np.nan)
     placed = points if start is None else _aligned(points[:_ALIGNED], distance, start).apply(points)
     off = np.abs(distance(placed))
     width = 2 / float(np.percentile(off / sigma, 95))
