@@ -139,8 +139,8 @@ def read_whole(path: Path, most_bytes: int) -> bytes:
     return content
 
 
-def read_given(path: Path, most_bytes: int, remedy: str) -> bytes:
-    """Do the same for a file that has to be there: what the system refuses is a DataError, too, with this remedy."""
+def read_input(path: Path, most_bytes: int, remedy: str) -> bytes:
+    """Read a whole input file, up to a limit; what the system refuses is a DataError with this remedy."""
     try:
         return read_whole(path, most_bytes)
     except OSError as error:

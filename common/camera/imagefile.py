@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import DataError
-from common.files import read_given
+from common.files import read_input
 from common.frame import PixelFormat, SpoiledImageError
 from common.imagesize.head import ImageHead, ImageKind
 from common.imagesize.read import read_head
@@ -61,7 +61,7 @@ def load(path: Path) -> ImageFile:
     Raises:
         DataError: the file cannot be read, its header is of none of these kinds, or no link takes an image of that size.
     """
-    return read_image(path, read_given(path, _MOST_BYTES, "check the file and its permissions"))
+    return read_image(path, read_input(path, _MOST_BYTES, "check the file and its permissions"))
 
 
 def read_image(path: Path, data: bytes) -> ImageFile:

@@ -20,7 +20,7 @@ from typing import Final
 
 from common.byte_order_mark import without_mark
 from common.errors import DataError
-from common.files import read_given, read_whole
+from common.files import read_input, read_whole
 from phone_host.model import StereoGeometry
 
 _MOST_BYTES: Final = 64 << 10
@@ -101,7 +101,7 @@ def read_calib_txt(path: Path, prefer: KittiCameras = KittiCameras.GREY) -> Cali
         DataError: the file cannot be read, or a key is missing or not valid; names file and key.
     """
     try:
-        text = without_mark(read_given(path, _MOST_BYTES, _REMEDY)).decode()
+        text = without_mark(read_input(path, _MOST_BYTES, _REMEDY)).decode()
     except UnicodeDecodeError as error:
         raise DataError(f"{path} is no text", _REMEDY) from error
     values = _values(text, path)

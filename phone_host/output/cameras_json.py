@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from common.camera_identity import LARGEST_LOCK, CameraIdentity, RememberedCamera, is_lock_name
 from common.errors import DataError
-from common.files import read_given
+from common.files import read_input
 from common.orientation import Flip, Orientation
 from common.versions import CAMERAS_FORMAT
 
@@ -39,7 +39,7 @@ def read_cameras(path: Path) -> tuple[RememberedCamera, RememberedCamera]:
         DataError: the file is missing, of a newer format, or not valid; names file and key.
     """
     try:
-        values = json.loads(read_given(path, _MOST_BYTES, _REMEDY).decode("utf-8"))
+        values = json.loads(read_input(path, _MOST_BYTES, _REMEDY).decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise DataError(f"{path} is no cameras.json", _REMEDY) from error
     reader = _Reader(path, "", values)

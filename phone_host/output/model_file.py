@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from common.errors import DataError
-from common.files import read_given, read_whole
+from common.files import read_input, read_whole
 from common.places import Kind, kind_of
 from phone_host.model import UnseenSurface
 from phone_host.output.axes import Axes
@@ -72,7 +72,7 @@ def read_model(path: Path, unit: str | None = None) -> Model:
     """
     file = mesh_file(path)
     is_scan = file != path
-    content = read_given(file, _MOST_BYTES, "check its permissions")
+    content = read_input(file, _MOST_BYTES, "check its permissions")
     reports = [_report(path / name) for name in _REPORTS] if is_scan else []
     report = next((told for told in reports if told), {})
     mesh = read_mesh(content, file.name, math.nan if is_scan else _UNITS_M.get(unit or "", math.nan))

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from common.errors import DataError
-from common.files import read_given
+from common.files import read_input
 from common.versions import OVERLAY_FORMAT
 from phone_host.model import Departure, Drift, Rig
 from phone_host.output.rig_files.tree import Node
@@ -66,7 +66,7 @@ def read_overlay(path: Path, rig: Rig) -> Departure:
         DataError: the file is missing, not valid, of a newer format, or belongs to another rig; names file and key.
     """
     try:
-        text = read_given(path, _MOST_BYTES, _REMEDY).decode("utf-8")
+        text = read_input(path, _MOST_BYTES, _REMEDY).decode("utf-8")
     except UnicodeDecodeError as error:
         raise DataError(f"{path} is no overlay.yaml", _REMEDY) from error
     node = Node(str(path), "", read_yaml(text, str(path)))

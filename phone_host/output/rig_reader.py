@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from common.camera_identity import RememberedCamera
 from common.errors import DataError
-from common.files import read_given
+from common.files import read_input
 from common.versions import RIG_FORMAT
 from common.words import counted
 from phone_host.model import CameraModel, TimeOffset, Verdict
@@ -99,7 +99,7 @@ class RigReader:
         self.version = 1
         try:
             given = (
-                read_given(path, _MOST_BYTES, "give the rig.yaml of `phone-host calibrate`")
+                read_input(path, _MOST_BYTES, "give the rig.yaml of `phone-host calibrate`")
                 if content is None
                 else content
             )

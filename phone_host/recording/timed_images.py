@@ -11,7 +11,7 @@ from typing import Final
 from common.camera.image_numbers import MOST_SPAN, numbers_of
 from common.camera.replay import find_images
 from common.errors import DataError
-from common.files import read_given
+from common.files import read_input
 from common.words import counted
 from phone_host.recording.import_rules import Unit, at_rate, dated_unit, numbers_in, times_ns, usual_step
 
@@ -145,5 +145,5 @@ def _sorted(images: list[TimedImage]) -> list[TimedImage]:
 
 
 def _lines(path: Path) -> list[str]:
-    text = read_given(path, _MOST_TIMES_BYTES, "check its name").decode("utf-8-sig", "replace")
+    text = read_input(path, _MOST_TIMES_BYTES, "check its name").decode("utf-8-sig", "replace")
     return [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("#")]

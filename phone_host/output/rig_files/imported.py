@@ -12,7 +12,7 @@ import numpy as np
 
 from common.byte_order_mark import without_mark
 from common.errors import DataError, SettingsError
-from common.files import read_given
+from common.files import read_input
 from common.places import Kind, kind_of
 from phone_host.model import Rectification, Rig
 from phone_host.output.calib_txt import is_calib_txt, read_calib_txt
@@ -221,7 +221,7 @@ def _rectified(path: Path, sizes_px: tuple[tuple[int, int], tuple[int, int]] | N
 
 def _text(path: Path) -> str:
     try:
-        return without_mark(read_given(path, _MOST_BYTES, _REMEDY)).decode()
+        return without_mark(read_input(path, _MOST_BYTES, _REMEDY)).decode()
     except UnicodeDecodeError as error:
         raise DataError(f"{path} is no text", _REMEDY) from error
 
